@@ -1,4 +1,4 @@
-"""Episodes as rows of a CSV file, compressed if its name ends in .gz: what pages are made of, and checked by."""
+"""Episodes as rows of a CSV file, compressed if its name ends in .gz; pages are written from them."""
 
 import csv
 import gzip
@@ -11,18 +11,18 @@ from uuv_marl.atomic import replacing
 from uuv_marl.benchmark.metrics import Metrics
 
 Row = Mapping[str, str]
-"""The cells of an episode by their columns; an empty one where there is nothing to measure."""
+"""Cells of an episode by column; empty where the value does not exist."""
 
 
 def cells(metrics: Metrics, names: Sequence[str], digits: str) -> dict[str, str]:
-    """What was measured, the task's own too, as it stands in a file, such as ``.6g``: six significant digits."""
+    """Metrics, also the task's own, as texts with ``digits`` such as ``.6g``."""
     metric_values: dict[str, Any] = {**metrics, **metrics.get("task", {})}
     values = {name: metric_values[name] for name in names}
     return {k: "" if v is None else f"{v:{digits}}" if isinstance(v, float) else str(v) for k, v in values.items()}
 
 
 def write_rows(path: Path, rows: Iterable[Row]) -> None:
-    """Write rows, of which there is at least one, whole or not at all; the same rows give the same bytes."""
+    """Write rows, at least one, atomically; the same rows give the same bytes."""
     columns, text = list(rows), io.StringIO(newline="")
     table = csv.DictWriter(text, columns[0], lineterminator="\n")
     table.writeheader()
@@ -40,23 +40,31 @@ def read_text(path: Path) -> str:
 
 
 def read_rows(path: Path) -> list[Row]:
-    """What ``write_rows`` wrote."""
+    """Read the file of ``write_rows``."""
     return list(csv.DictReader(io.StringIO(read_text(path), newline="")))
 
 
 def measured(rows: Iterable[Row], name: str) -> list[float]:
-    """What was measured, one value for each row that has one."""
+    """Values of a column in the rows that have one."""
     return [float(row[name]) for row in rows if row[name]]
 
 
 def short(share: float) -> str:
-    """Two digits after the point, without a zero before it."""
+    """Two decimals without a leading zero."""
     return f"{share:.2f}".replace("0.", ".", 1)
 
 
 def succeeded(row: Row) -> bool:
-    """Whether the swarm arrived, and nobody touched anything."""
+    """Whether the swarm arrives without a collision."""
     return bool(row["task_time_s"]) and row["collisions"] == "0"
+
+
+def grouped(rows: Iterable[Row], *names: str) -> dict[tuple[str, ...], list[Row]]:
+    """The rows by their values in these columns, in the order of first appearance."""
+    groups: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        groups.setdefault(tuple(row[name] for name in names), []).append(row)
+    return groups
 
 
 def select(rows: Iterable[Row], **values: str) -> list[Row]:

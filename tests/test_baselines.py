@@ -17,7 +17,7 @@ from tests.golden import STARTER
 from tests.nets import ANYWHERE, saved
 from uuv_marl import load_scenario, parallel_env, scenario_names
 from uuv_marl.baselines import POLICIES, Policy, PolicyError, make_policy, with_policy_requirements
-from uuv_marl.baselines.making import uses_identity
+from uuv_marl.baselines.making import policy_requirements
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
 from uuv_marl.benchmark.tuning import SPACES, TRIALS
@@ -323,9 +323,10 @@ def test_a_policy_that_acts_by_a_vehicles_index_declares_it(name):
         copies = dataclasses.replace(percept, flat=np.repeat(percept.flat[:, 2:3], 4, axis=1))
         acted_alike &= np.allclose(alike.act(copies), action[:, 2:3], atol=1e-3)
         percept = swarm.step(action)
-    assert uses_identity(name) == (not acted_alike and name != "random")
+    assert policy_requirements(name).identity == (not acted_alike and name != "random")
 
 
 def test_a_network_around_a_law_that_acts_by_the_index_does_so_too(tmp_path):
     for law, told in {"nearest_target,lanes=true": True, "nearest_target,lanes=false": False}.items():
-        assert uses_identity(saved(tmp_path, load_scenario("silent_targets"), around=law)) is told
+        checkpoint = saved(tmp_path, load_scenario("silent_targets"), around=law)
+        assert policy_requirements(checkpoint).identity is told

@@ -1,4 +1,4 @@
-"""What users see of the sea: velocities over ground, pictures and replays of the current, and headers."""
+"""Disturbances as users see them: velocities over ground, pictures and replays of the current, and headers."""
 
 import json
 from pathlib import Path

@@ -188,7 +188,11 @@ def test_the_table_of_policies_is_right():
     for name, policy in POLICIES.items():
         by = getattr(policy, "identity", False)
         told = [f"with `{by}=true` identity"] if isinstance(by, str) else ["identity"] * by
-        parts = [*policy.channels, *told, *(["yaw damping"] if policy.yaw_damping_nms else [])]
+        parts = [
+            *policy.requirements.channels,
+            *told,
+            *(["yaw damping"] if policy.requirements.yaw_damping_nms else []),
+        ]
         assert needs[name] == (", ".join(parts) or "nothing"), name
 
 

@@ -214,9 +214,9 @@ def test_what_is_no_checkpoint_is_explained(best, tmp_path):
 
 
 def test_a_rewritten_checkpoint_is_loaded_anew(best):
-    assert policy_class(best).yaw_damping_nms == 600.0
+    assert policy_class(best).requirements.yaw_damping_nms == 600.0
     saved(Path(best), water(**{"actuators.yaw_damping_nms": 100.0}))
-    assert policy_class(best).yaw_damping_nms == 100.0
+    assert policy_class(best).requirements.yaw_damping_nms == 100.0
 
 
 @pytest.mark.parametrize(("field", "value"), [("vehicle.m_kg", 600.0), ("actuators.lever_arm_m", 2.0)])

@@ -18,7 +18,7 @@ from uuv_marl.benchmark import load, load_trace, runner
 from uuv_marl.benchmark.evaluate import Routes, Run, episodes
 from uuv_marl.benchmark.metrics import Metrics, Sample
 from uuv_marl.benchmark.results import Content, PolicyInfo, ResultRow, Results, trace_path
-from uuv_marl.benchmark.tables import markdown_table, task_rows
+from uuv_marl.benchmark.tables import markdown_table, scenario_table
 from uuv_marl.cli import app
 from uuv_marl.errors import ResultsError
 from uuv_marl.tasks.measures import Shares
@@ -269,7 +269,7 @@ def test_a_row_names_the_index_that_a_policy_acts_by(tmp_path):
     scenario, policies = quick("silent_targets"), ["nearest_target", "nearest_target,lanes=true"]
     results = Results(tmp_path, [scenario], traces=False)
     runner.run_missing(results, [scenario], policies, [0], lambda *a: None)
-    assert [row[1] for row in task_rows(results, scenario.name, policies, [0])] == ["–", "identity"]
+    assert [row[1] for row in scenario_table(results, scenario, policies, [0]).rows] == ["–", "identity"]
 
 
 def keys(title):

@@ -70,9 +70,8 @@ def table(policy="p", **cells):
 
 def test_an_axis_is_the_mean_over_its_levels():
     found = scores.axis_score(table(calm=[1.0, 0.8] * 3, W1_1=[1.0, 0.7] * 3, W1_3=[0.5, 0.0] * 3), "W1")
-    assert found.success.value == pytest.approx(0.55)
-    assert found.success.low < 0.55 < found.success.high
-    assert found.levels == (0, 1, 3)
+    assert found.value == pytest.approx(0.55)
+    assert found.low < 0.55 < found.high
     assert scores.axis_score(table(calm=[1.0] * 6), "W1") is None
 
 
@@ -81,26 +80,6 @@ def test_the_whole_counts_no_group_that_some_policies_lack():
     without = scores.group_score(table(**cells), scores.EVERY)
     assert without.value == 0.75
     assert scores.group_score(table(**cells, C1_1=[0.0] * 6, X_1=[0.0] * 6), scores.EVERY) == without
-
-
-@pytest.mark.parametrize(
-    ("cells", "text"),
-    [
-        ({"calm": 1.0, "W1_1": 1.0, "W1_3": 0.8}, "0.155"),  # half way from 0.06 to 0.25
-        ({"calm": 1.0, "W1_1": 0.8, "W1_3": 1.0}, "0.03"),  # the first loss counts
-        ({"calm": 1.0, "W1_1": 0.9, "W1_3": 0.5}, "0.06"),
-        ({"calm": 0.89, "W1_1": 1.0}, "fails undisturbed"),
-        ({"calm": 1.0, "W1_1": 0.9, "W1_3": 0.95}, "beyond 0.25"),
-        ({"calm": 1.0, "A2_1": 1.0, "A2_2": 0.8}, "0.415"),  # half way from 0.5 to 0.33 of the torque
-        ({"calm": 1.0, "S4_1": 0.5}, "between all and 200/500 m"),
-        ({"calm": 1.0, "F1_1": 1.0, "F1_3": 0.5}, "between 10 % x 0.75 and 30 % x 0.5"),
-        ({"calm": 1.0, "X_1": 1.0, "X_3": 0.9, "X_5": 0.0}, "medium"),
-    ],
-)
-def test_critical_severity_in_the_axis_s_unit(cells, text):
-    axis = list(cells)[-1].partition("_")[0]
-    found = scores.axis_score(table(**{name: [value] * 6 for name, value in cells.items()}), axis)
-    assert scores.critical_text(axis, found) == text
 
 
 # Job, page, command

@@ -5,6 +5,7 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import Policy, PolicyError, make_policy, with_policy_requirements
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
 from uuv_marl.benchmark.evaluate import Run, episodes
@@ -14,7 +15,7 @@ from uuv_marl.sim.swarm import Swarm
 class Ahead(Policy):
     """Full thrust, and nothing else."""
 
-    yaw_damping_nms = 600.0
+    requirements = PolicyRequirements(yaw_damping_nms=600.0)
 
     def decide(self, percept):
         action = np.zeros((*percept.flat.shape[:2], 2), np.float32)

@@ -194,7 +194,7 @@ def test_the_example_trains_a_policy(tmp_path):
     assert f"--scenario starter --policy {tmp_path}" in done.stdout
     assert PPO.load(tmp_path / "model").num_timesteps > 100
     scenario = with_policy_requirements(str(tmp_path), load_scenario("starter"))
-    assert make_policy(str(tmp_path), scenario).yaw_damping_nms == 600.0
+    assert make_policy(str(tmp_path), scenario).requirements.yaw_damping_nms == 600.0
 
 
 def test_a_reset_or_a_refusal_leaves_no_action_behind():

@@ -78,7 +78,7 @@ class Toy:
         self.observation = self._rng.uniform(-1, 1, (self.rows, self.size)).astype(np.float32)
 
     def query_expert(self, action):
-        """The teacher does (x2, -x1), and lets the network act."""
+        """The expert's action is (x2, -x1), and the network acts."""
         return self.observation[:, 1::-1] * np.array([1.0, -1.0], np.float32), action
 
     def step(self, action):
@@ -142,7 +142,7 @@ def test_a_one_step_task_is_solved():
     assert np.sqrt(np.mean((action - x[:, :2] * (0.5, -0.5)) ** 2)) < 0.1
 
 
-def test_a_lesson_is_learned_whatever_pays():
+def test_imitation_ignores_the_reward():
     toy = Toy(lambda observation, action: 10.0 * observation[:, 0] * action[:, 0])
     learner = learner_for(toy, Ppo(horizon=8))
     learner.set_imitation(imitating=True)
@@ -156,11 +156,11 @@ def test_a_lesson_is_learned_whatever_pays():
 
 
 @pytest.mark.parametrize(("imitation_weight", "near"), [(0.0, (0.5, -0.5, 0, 0)), (30.0, (0, 0, 1.0, -1.0))])
-def test_a_pull_holds_at_the_teacher_against_what_pays(pull, near):
-    """Half of what is seen pays, and the teacher swaps it."""
+def test_an_imitation_weight_keeps_the_policy_near_the_expert_against_the_reward(imitation_weight, near):
+    """Half of the observation is rewarded, and the expert swaps it."""
     toy = Toy(lambda observation, action: -np.square(action - observation[:, :2] * (0.5, -0.5)).sum(axis=1))
     learner = learner_for(toy, Ppo(horizon=8))
-    learner.set_imitation(imitating=False, pull=pull)
+    learner.set_imitation(imitating=False, imitation_weight=imitation_weight)
     for _ in range(150):
         learner.update(learner.sample(toy, 0.2)[0], 0.2, 3e-3)
     x = np.random.default_rng(5).uniform(-1, 1, (500, 3)).astype(np.float32)
@@ -280,8 +280,8 @@ def test_rows_of_mixed_sizes_end_and_start_anew():
     assert np.abs(came.final - before).max() < np.abs(env.observation - before).max()
 
 
-def test_contacts_cost_more_as_a_training_goes_on(tmp_path, no_validation):
-    """Nothing else is charged, and each contact that begins by as much."""
+def test_collisions_cost_more_as_a_training_goes_on(tmp_path, no_validation):
+    """Each collision costs as much, and nothing else changes."""
     crowd = Training(scenario="starter", sizes=[(12, 4)], ppo=TINY)
     plain, charged, found = rows_for(crowd), rows_for(crowd), 0
     charged.set_collision_cost(7.0)
@@ -289,13 +289,13 @@ def test_contacts_cost_more_as_a_training_goes_on(tmp_path, no_validation):
     for _ in range(60):
         action = rng.uniform(-1.0, 1.0, (48, 2)).astype(np.float32)
         less = plain.step(action).reward - charged.step(action).reward
-        contacts = charged.groups[0].env.swarm.facts.vehicle_collisions.ravel()
-        np.testing.assert_allclose(less, 7.0 * contacts, atol=1e-4)
-        found += contacts.sum()
+        collisions = charged.groups[0].env.swarm.facts.vehicle_collisions.ravel()
+        np.testing.assert_allclose(less, 7.0 * collisions, atol=1e-4)
+        found += collisions.sum()
     assert found > 0
     costs = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Rows, "charge", lambda self, cost: costs.append(cost))
+        patch.setattr(Rows, "set_collision_cost", lambda self, cost: costs.append(cost))
         list(train(tmp_path, small(steps=5 * 168)))
     assert costs[0] == 1.0
     assert costs == sorted(costs)
@@ -334,7 +334,7 @@ NEARER = {"name": "own_task:Nearer", "near_m": 20.0}
 
 
 @pytest.mark.parametrize(
-    ("told", "cost"),
+    ("fields", "cost"),
     [
         ({}, (1.0, 300.0)),
         ({"scenario": "few_informed", "reward": "leader"}, (1.0, 300.0)),
@@ -346,24 +346,28 @@ NEARER = {"name": "own_task:Nearer", "near_m": 20.0}
         ({"ppo": {"collision_cost": (0.0, 0.0)}}, (0.0, 0.0)),
     ],
 )
-def test_contacts_cost_nothing_beyond_a_reward_of_ones_own(told, cost, own_task):
-    training = Training(**told)
+def test_collisions_cost_nothing_beyond_a_reward_of_ones_own(fields, cost, own_task):
+    training = Training(**fields)
     assert training.ppo.collision_cost == cost
     assert Training(**json.loads(training.model_dump_json())) == training
-    assert ("contact that begins costs" in objective(training)) == (cost[1] > 0.0)
+    assert ("collision costs" in objective(training)) == (cost[1] > 0.0)
 
 
 def test_a_training_begins_with_its_whole_objective(tmp_path, own_task, no_validation):
     said = []
-    list(train(tmp_path / "a", small(steps=1, expert="scout", lesson=0.3, pull=2.0), say=said.append))
-    assert said[1] == objective(small(expert="scout", lesson=0.3, pull=2.0))
+    list(
+        train(
+            tmp_path / "a", small(steps=1, expert="scout", imitation_share=0.3, imitation_weight=2.0), say=said.append
+        )
+    )
+    assert said[1] == objective(small(expert="scout", imitation_share=0.3, imitation_weight=2.0))
     for part in (
         "Reward dense of task follow on starter\n  tracking: -0.1 · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's",
         "\n  arrival: +20 for every vehicle",
         "d: the vehicle's distance to l(t), D: 500 m, c: 10 m\n",
-        "\nIn addition a contact that begins costs 1 at the start and 300 at the end (ppo.collision_cost); discount 0.99",
-        "For 30% of the budget the network first imitates scout, whatever is paid.",
-        "Then 2 times the mean squared distance from what it would do is added to PPO's loss.",
+        "\nIn addition a collision costs 1 at the start and 300 at the end (ppo.collision_cost); discount 0.99",
+        "For 30% of the budget the network first imitates scout.",
+        "Then 2 times the mean squared distance from its actions is added to PPO's loss.",
     ):
         assert part in said[1]
     own = objective(small(overrides={"task": "own_task:Mine"}))
@@ -407,7 +411,8 @@ RUDDER = {
 
 
 @pytest.mark.parametrize("beside", [
-    {}, {"filter": True}, {"base_controller": "scout"}, RUDDER, {**RUDDER, "base_controller": "scout"}, {**RUDDER, "base_controller": "sff"},
+    {}, {"filter": True}, {"base_controller": "scout"}, RUDDER, {**RUDDER, "base_controller": "scout"},
+    {**RUDDER, "base_controller": "sff"},
 ], ids=["alone", "filter", "scout", "rudder", "rudder, scout", "rudder, sff"])  # fmt: skip
 def test_rows_act_as_the_policy_will(beside, tmp_path):
     """What comes of a training's actions is what comes of its checkpoint's, filter, law and all bounds included."""
@@ -431,56 +436,56 @@ def test_rows_act_as_the_policy_will(beside, tmp_path):
 
 
 @pytest.mark.parametrize("beside", [{}, {"filter": True}, RUDDER], ids=["alone", "filter", "rudder"])
-def test_a_teacher_is_told_what_was_done_and_acts_as_it_would_alone(beside):
-    """It says what it would do; where it teaches, that is done; its memory is that of one who did what was done."""
+def test_an_expert_records_the_executed_action_and_acts_as_it_would_alone(beside):
+    """Its actions are executed in its own worlds, and its memory follows the executed ones in all."""
     brief = {"time_limit.factor": 0.001, "time_limit.extra_s": 3.0}
-    told = {"scenario": "starter", **beside, "expert": "scout"}
-    training = Training(sizes=[(4, 2)], ppo=TINY, **{**told, "overrides": told.get("overrides", {}) | brief})
-    seeds, taken = itertools.count(100_000), []
+    fields = {"scenario": "starter", **beside, "expert": "scout"}
+    training = Training(sizes=[(4, 2)], ppo=TINY, **{**fields, "overrides": fields.get("overrides", {}) | brief})
+    seeds, executed = itertools.count(100_000), []
     env = Rows(training, lambda num: [next(seeds) for _ in range(num)])
     group = env.groups[0]
     alone = make_policy("scout", group.env.swarm.scenario, 2)
     step = group.env.step
-    group.env.step = lambda action: taken.append(action) or step(action)
+    group.env.step = lambda action: executed.append(action) or step(action)
     for _ in range(16):
-        group._teaches[:] = True, False
+        group._expert_acts[:] = True, False
         expected = alone.act(group.env.swarm.percept).copy()
         said, done = env.query_expert(np.full((env.rows, 2), 0.3, np.float32))
         np.testing.assert_array_equal(said, expected.reshape(-1, 2))
         np.testing.assert_array_equal(done, [*said[:4], *np.full((4, 2), np.float32(0.3))])
         env.step(done)
-        alone.taken(taken[-1])
+        alone.record_action(executed[-1])
     assert next(seeds) > 100_004  # new worlds have begun
-    assert np.abs(taken[-1][0] - expected[0]).max() < 1e-6 or beside.get("filter")
-    assert np.abs(taken[-1][1] - expected[1]).max() > 1e-3
+    assert np.abs(executed[-1][0] - expected[0]).max() < 1e-6 or beside.get("filter")
+    assert np.abs(executed[-1][1] - expected[1]).max() > 1e-3
 
 
-def test_a_teacher_that_lacks_what_it_needs_is_named(tmp_path):
+def test_an_expert_without_its_requirements_is_named(tmp_path):
     for expert, scenario, why in [
         ("scoot", "starter", "unknown; did you mean 'scout'"),
         ("orca_informed", "starter", "link"),
     ]:
-        with pytest.raises(TrainingError, match=f"teacher = '{expert}' can't teach on {scenario}: .*{why}"):
+        with pytest.raises(TrainingError, match=f"expert = '{expert}' can't run on {scenario}: .*{why}"):
             list(train(tmp_path / "a", Training(scenario=scenario, expert=expert, steps=100)))
         assert not (tmp_path / "a" / "config.json").exists()
 
 
-def test_fewer_and_fewer_worlds_are_the_teachers():
+def test_fewer_and_fewer_worlds_are_the_experts():
     training = Training(scenario="starter", sizes=[(1, 400)], expert="random", overrides={"time_limit.factor": 0.001})
     drawn = np.random.default_rng(0)
     env = Rows(training, lambda num: drawn.integers(*TRAINING_SEEDS, num))
     for share in (1.0, 0.6, 0.0, -0.3):
-        env.set_imitation(share)
+        env.set_expert_share(share)
         ended = np.zeros(env.rows, np.bool_)
         while not ended.all():
             env.query_expert(np.zeros((env.rows, 2), np.float32))
             came = env.step(np.zeros((env.rows, 2), np.float32))
             ended |= came.terminated | came.truncated
-        assert abs(env.groups[0]._teaches.mean() - max(share, 0.0)) < 0.1
+        assert abs(env.groups[0]._expert_acts.mean() - max(share, 0.0)) < 0.1
 
 
-def test_rewards_count_after_the_lesson(tmp_path, no_validation):
-    """In a lesson of nine tenths the network is far from who acts, the teacher; then PPO is near itself."""
+def test_rewards_count_after_the_imitation(tmp_path, no_validation):
+    """During imitation the network is far from the expert that acts; then PPO is near itself."""
     fields = {"scenario": "starter", "sizes": [(4, 2)], "steps": 20 * 64, "imitation_share": 0.9, "expert": "scout"}
     records = list(train(tmp_path, Training(ppo=TINY, **fields)))
     assert len(records) == 20
@@ -488,13 +493,17 @@ def test_rewards_count_after_the_lesson(tmp_path, no_validation):
     assert 1e-6 < min(after) <= max(after) < 0.1 < min(record.kl for record in records[:18])
 
 
-def test_after_the_lesson_the_network_acts_and_is_told_what_the_teacher_would_do():
-    """In worlds that began while the teacher acted, too."""
-    trainer = Trainer(Training(scenario="starter", sizes=[(4, 2)], ppo=TINY, expert="scout", lesson=0.0, pull=2.0))
-    trainer.learner.set_imitation(imitating=False, pull=2.0)
+def test_after_the_imitation_the_network_acts_and_the_expert_is_queried():
+    """Also in worlds that started while the expert acted."""
+    trainer = Trainer(
+        Training(
+            scenario="starter", sizes=[(4, 2)], ppo=TINY, expert="scout", imitation_share=0.0, imitation_weight=2.0
+        )
+    )
+    trainer.learner.set_imitation(imitating=False, imitation_weight=2.0)
     batch, _ = trainer.learner.sample(trainer.rows, 1e-3)
     assert (batch.action - batch.mean).abs().max() < 0.01
-    assert (batch.action - batch.told).abs().mean() > 0.1
+    assert (batch.action - batch.expert_action).abs().mean() > 0.1
 
 
 def test_training_worlds_are_not_those_of_validation():
@@ -535,7 +544,7 @@ def small(**changes):
 @pytest.fixture
 def no_validation(monkeypatch):
     verdicts = itertools.cycle([0.2, 0.5, 0.4])
-    monkeypatch.setattr(trainings, "validate", lambda *_: GOOD._replace(whole=next(verdicts)))
+    monkeypatch.setattr(trainings, "validate", lambda *_: GOOD._replace(swarm_success=next(verdicts)))
 
 
 def begun(folder, iterations, **changes):
@@ -570,7 +579,7 @@ def rows(folder):
         {"expert": "scout", "imitation_share": 0.3},
         {"expert": "scout", "imitation_share": 0.3, "imitation_weight": 2.0},
     ],
-    ids=["gru", "sectors", "filter", "random", "scout", "lesson", "pull"],
+    ids=["gru", "sectors", "filter", "random", "scout", "imitation", "weight"],
 )
 def test_a_resumed_training_equals_an_uninterrupted_one(kind, tmp_path, no_validation):
     """Bit for bit: weights, optimiser, memories, worlds and random numbers; stopped after a checkpoint, and between."""
@@ -624,7 +633,7 @@ def test_a_reward_of_ones_own_is_learned_from(tmp_path, no_validation, monkeypat
     monkeypatch.syspath_prepend(tmp_path)
     (record,) = train(tmp_path / "a", small(steps=1, reward="mine:still"))
     assert -6.0 < record.reward < 0.0
-    with pytest.raises(RewardError, match=r"must give an array \(2, 2\), got \(2,\)"):
+    with pytest.raises(RewardError, match=r"must have shape \(2, 2\) \(world, vehicle\), got \(2,\)"):
         list(train(tmp_path / "b", small(steps=1, sizes=((2, 2),), reward="mine:single")))
     for name, message in (
         ("mine:nothing", "reward 'mine:nothing' can't be imported.*give module:function"),
@@ -645,7 +654,7 @@ def test_the_starter_scenario_is_learned_in_seconds(tmp_path):
 def test_the_best_policy_is_kept_with_its_worst_episode(tmp_path, monkeypatch):
     scores = iter([0.2, 0.5, 0.4, 0.5])
     seen = iter([900_001, 900_002, 900_003, 900_004])
-    judge = lambda *_: GOOD._replace(whole=next(scores), share=0.5, worst=Worst("starter", 6, next(seen)))  # noqa: E731
+    judge = lambda *_: GOOD._replace(swarm_success=next(scores), share=0.5, worst=Worst("starter", 6, next(seen)))  # noqa: E731
     monkeypatch.setattr(trainings, "validate", judge)
     records = list(train(tmp_path / "a", small(validations=4, steps=4 * 168)))
     assert [record.best for record in records] == [0.35, 0.5, 0.5, 0.5]
@@ -681,11 +690,9 @@ def test_a_folder_says_why_it_can_not_go_on_here_and_what_made_it_so_far(tmp_pat
     list(train(tmp_path / "a", small(steps=200, scenario=mine)))
     config = tmp_path / "a" / "config.json"
     config.write_text(config.read_text().replace('"torch": "', '"torch": "0.'))
-    assert "so far it was made by torch 0." in TrainingFolder(tmp_path / "a", None).found
+    assert "earlier parts ran with torch 0." in TrainingFolder(tmp_path / "a", None).resume_note
     mine.unlink()
-    with pytest.raises(
-        ResultsError, match="can't be made again here: scenario file .* does not exist.*resume it where"
-    ):
+    with pytest.raises(ResultsError, match="can't be loaded here: scenario file .* does not exist.*resume it where"):
         next(resume(tmp_path / "a"))
     with pytest.raises(TrainingError, match="steps must be a finite number, got nan"):
         TrainingFolder(tmp_path / "b", small()).budget_with(None, float("nan"))
@@ -720,7 +727,7 @@ def test_a_folder_that_is_used_or_empty_or_of_another_scenario_is_refused(tmp_pa
         next(resume(tmp_path / "b"))
 
 
-def test_a_teacher_whose_file_has_changed_is_refused(tmp_path, no_validation):
+def test_an_expert_whose_file_has_changed_is_refused(tmp_path, no_validation):
     """Behind a prefix of its name, too; a folder from before files were noted goes on."""
     expert = tmp_path / "expert"
     card = card_for(small().loaded)
@@ -732,9 +739,7 @@ def test_a_teacher_whose_file_has_changed_is_refused(tmp_path, no_validation):
     assert list(resume(tmp_path / "same"))
     save_checkpoint(expert / WEIGHTS_FILE, card, {name: 2.0 * array for name, array in weights.items()})
     for k, name in enumerate((f"{expert}", f"{expert},safety_filter=true")):
-        told = (
-            rf"begun with teacher = {name} \(\w+\), and teacher is {name} \(\w+\) now; give {name} as it was, or begin"
-        )
+        told = rf"started with expert = {name} \(\w+\), and expert is {name} \(\w+\) now; restore {name}, or start"
         with pytest.raises(ResultsError, match=told):
             next(resume(tmp_path / f"{k}"))
     config = tmp_path / "0" / "config.json"
@@ -743,7 +748,7 @@ def test_a_teacher_whose_file_has_changed_is_refused(tmp_path, no_validation):
     config.write_text(json.dumps(noted))
     assert list(resume(tmp_path / "0"))
     shutil.rmtree(expert)
-    with pytest.raises(ResultsError, match="can't be made again here: policy .* can't be read"):
+    with pytest.raises(ResultsError, match="can't be loaded here: policy .* can't be read"):
         next(resume(tmp_path / "1"))
 
 
@@ -756,7 +761,7 @@ def test_a_training_that_is_told_to_stop_ends_with_a_checkpoint(tmp_path, no_val
     assert [record.iteration for record in first] == list(range(1, stop + 1))
     rest = list(resume(tmp_path / "a", say=said.append))
     assert [record.iteration for record in rest] == list(range(stop + 1, 6))
-    assert said[0] == f"going on from iteration {stop}, {168 * stop:,} agent-steps"
+    assert said[0] == f"resuming from iteration {stop}, {168 * stop:,} agent-steps"
     assert files(tmp_path / "a") == files(tmp_path / "swarm_success")
 
 
@@ -802,7 +807,7 @@ def test_an_incomplete_last_checkpoint_is_named(tmp_path, no_validation):
     rest = list(resume(tmp_path / "a", say=said.append))
     assert [record.iteration for record in rest] == [3, 4, 5]
     assert "000005 is incomplete" in said[0]
-    assert "going on from iteration 2" in said[0]
+    assert "resuming from iteration 2" in said[0]
     assert [path.name for path in own.iterdir()] == ["000005"]
 
 
@@ -900,27 +905,27 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        ({"ppo": {"learning_rate": (np.inf, 0.1)}}, "ppo.learning_rate.0 should be a finite number, got inf"),
-        ({"ppo": {"noize": 0.1}}, "ppo.noize is unknown; did you mean 'noise'?"),
-        ({"network": {"kind": "cnn"}}, "network.kind should be 'mlp', 'sectors' or 'moments', got 'cnn'"),
+        ({"ppo": {"learning_rate": (np.inf, 0.1)}}, "ppo.learning_rate.0 must be a finite number, got inf"),
+        ({"ppo": {"noize": 0.1}}, "ppo.noize is unknown; did you mean 'ppo.noise'"),
+        ({"network": {"kind": "cnn"}}, "network.kind must be 'mlp', 'sectors' or 'moments', got 'cnn'"),
         ({"minutes": 1, "steps": 100}, "minutes = 1 and steps = 100 are both given; leave one out"),
         ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
         ({"base_controller": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
         (
             {"base_controller": "scout", "expert": "scout"},
-            "teacher 'scout' and around 'scout' are both given; leave one out",
+            "expert 'scout' and base_controller 'scout' are both given; leave one out",
         ),
         (
             {"imitation_weight": 2.0},
-            "pull = 2 is to a teacher, and none is given; name one, or leave pull out",
+            "imitation_weight = 2 needs an expert, and none is given; name one, or leave it out",
         ),
         ({"scenario": "lossy"}, "training can't represent the loss of a vehicle"),
-        ({"sizes": [0]}, "sizes.0.0 should be greater than or equal to 1, got 0"),
-        ({"sizes": [[5, -1]]}, "sizes.0.1 should be greater than or equal to 0, got -1"),
+        ({"sizes": [0]}, "sizes.0.0 must be greater than or equal to 1, got 0"),
+        ({"sizes": [[5, -1]]}, "sizes.0.1 must be greater than or equal to 0, got -1"),
         ({"extra_scenarios": ["lossy"]}, "training can't represent the loss of a vehicle"),
         (
             {"extra_scenarios": ["few_informed"]},
-            "also = 'few_informed' has another percept than 'starter', and one network",
+            "extra_scenarios has 'few_informed' with another percept than 'starter', and one network",
         ),
     ],
 )
@@ -939,7 +944,7 @@ def test_what_is_written_is_what_was_told():
 
 def test_a_file_that_is_no_recipe_is_named(tmp_path):
     (tmp_path / "bad.toml").write_text("steps = \n", encoding="utf-8")
-    with pytest.raises(TrainingError, match=r"bad.toml is no TOML"):
+    with pytest.raises(TrainingError, match=r"bad.toml is not valid TOML"):
         recipe_fields(str(tmp_path / "bad.toml"))
     with pytest.raises(TrainingError, match=r"gone.toml can't be read \(No such file or directory\); give"):
         recipe_fields(str(tmp_path / "gone.toml"))
@@ -964,7 +969,7 @@ def test_the_command_says_what_to_train_and_can_be_stopped(tmp_path, monkeypatch
     command += ["--set=sizes=[5,20]", "--set=ppo.noise=[0.3, 0.1]", "--set=sonar.echo_reports=centre"]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output
-    assert "swarms whole 75%, vehicles 90%, contacts 0.5 an episode, time 30 s" in done.output
+    assert "swarm success 75%, vehicles 90%, collisions 0.5 per episode, time 30 s" in done.output
     assert "250 agent-steps/s" in done.output
     assert calls == [
         Training(
@@ -984,12 +989,12 @@ def test_the_command_goes_on_with_what_the_folder_holds(tmp_path, no_validation)
     list(train(tmp_path, small(steps=168)))
     refused = CliRunner().invoke(app, ["train", "hard_water", "--resume", f"--output={tmp_path}"])
     assert refused.exit_code == 2
-    assert "goes on with the training that the folder holds; leave out the scenario" in " ".join(
+    assert "continues the training in the folder; leave out the scenario" in " ".join(
         refused.output.replace("│", " ").split()
     )
     done = CliRunner().invoke(app, ["train", "--resume", f"--output={tmp_path}", "--steps=336"])
     assert done.exit_code == 0, done.output
-    assert "Its validation was the best: swarms whole" in " ".join(done.output.split())
+    assert "Best validation: swarm success" in " ".join(done.output.split())
     assert f"uuv-marl replay --scenario starter --policy {tmp_path}/best --seed 900000" in done.output
     assert [row["agent_steps"] for row in rows(tmp_path)] == ["168", "336"]
     again = CliRunner().invoke(app, ["train", "--resume", f"--output={tmp_path}"])
@@ -999,7 +1004,7 @@ def test_the_command_goes_on_with_what_the_folder_holds(tmp_path, no_validation)
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--steps=3.5"], "'3.5' is no whole number from 1 on"),
+        (["--steps=3.5"], "'3.5' is not a whole number from 1 on"),
         (["nowhere"], "scenario 'nowhere'"),
         (["nowhere.toml"], "nowhere.toml can't be read"),
         (["--minutes=1", "--steps=100"], "are both given; leave one out"),

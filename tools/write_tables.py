@@ -50,10 +50,10 @@ def fields(layout: tuple[PerceptField, ...], start: int = 0) -> str:
     """A table of fields with the index range of each."""
     lines: list[tuple[str, ...]] = []
     for field in layout:
-        kind = field.kind
+        quantity = field.quantity
         entries = f"{start}" if field.size == 1 else f"{start}-{start + field.size - 1}"
-        bounds = f"{kind.low / kind.scale:g} to {kind.high / kind.scale:g}"
-        lines.append((entries, f"`{field.name}`", field.meaning, kind.unit, f"{kind.scale:g}", bounds))
+        bounds = f"{quantity.low / quantity.scale:g} to {quantity.high / quantity.scale:g}"
+        lines.append((entries, f"`{field.name}`", field.meaning, quantity.unit, f"{quantity.scale:g}", bounds))
         start += field.size
     return table(("entries", "name", "meaning", "unit", "scale", "bounds (scaled)"), lines)
 

@@ -1,7 +1,7 @@
-"""Formations of steady tracking: places where the paper's law (Eq. 18-20) balances the drag on a straight leg.
+"""Formations of steady tracking: places where the paper's controller (Eq. 18-20) balances the drag on a straight leg.
 
-Positions are relative to l(t), x ahead and y to starboard. Freezing whom each vehicle hears makes the law smooth;
-whether such places exist for the vehicles' own neighbour sets is part of the result (``Formation.settled``).
+Positions are relative to l(t), x ahead and y to starboard. With frozen neighbour sets the control law is
+smooth; ``Formation.settled`` says whether the vehicles detect these sets at such places.
 """
 
 from collections.abc import Sequence
@@ -23,27 +23,27 @@ _WITHIN_M = 5.0
 
 
 class Formation(NamedTuple):
-    """Places of steady tracking, and whom each vehicle hears there."""
+    """Places of steady tracking, and the neighbours that each vehicle detects there."""
 
     places: Float64
     """Places relative to l(t) [m], shape (vehicle, 2)."""
     neighbour_indices: Int32
-    """Index of the vehicle heard, -1 for none, shape (vehicle, sector)."""
+    """Index of the vehicle detected, -1 for none, shape (vehicle, sector)."""
     residual_n: float
-    """Root mean square over vehicles of the force that is missing for balance [N]; 0 where settled."""
+    """Root mean square over vehicles of the unbalanced force [N]; 0 where settled."""
     settled: bool
-    """Whether forces balance with the neighbour sets that the vehicles hear there."""
+    """Whether forces balance with the neighbour sets that the vehicles detect there."""
 
 
 def straight_leg(
     num_vehicles: int = 54, yaw_damping_nms: float = 0.0, control_step_s: float = 0.1, leg_m: float = 4000.0
 ) -> Scenario:
-    """Open water and one leg to the north that starts at the origin; all clocks tick with the control hold.
+    """Open water and one leg to the north from the origin; all clocks have the same period.
 
     Args:
         num_vehicles: size of the swarm.
         yaw_damping_nms: torque against the yaw rate [N m s]; 0 for none, as in the paper.
-        hold_s: control hold, integration step and decision period [s].
+        control_step_s: control step, integration step and decision period [s].
         leg_m: length of the leg [m].
     """
     clocks = ("control_step_s", "integration_step_s", "decision_period_s")
@@ -55,16 +55,16 @@ def straight_leg(
 
 
 def drag_n(scenario: Scenario) -> float:
-    """Resistance at the reference's speed [N]: the force that every vehicle needs on a leg."""
+    """Drag at the reference's speed [N]."""
     speed = scenario.trajectory.speed_mps
     return (scenario.vehicle.X_u + scenario.vehicle.X_uu * speed) * speed
 
 
 def links(places: Float64, neighbour_indices: Int32, gains: BioInspiredGains) -> tuple[Float64, Float64, Float64]:
-    """Of every link: where the neighbour is [m], shape (..., vehicle, sector, 2), and its weight and slope.
+    """Position of the neighbour [m] of every link, shape (..., vehicle, sector, 2), its weight and slope.
 
     The force from a neighbour at p is weight p, and changes with p by weight I + slope p p^T. Both [N/m, N/m3] are 0
-    where nobody is heard. Eq. 20.
+    without a detection. Eq. 20.
     """
     at = np.take_along_axis(places[..., None, :, :], np.maximum(neighbour_indices, 0)[..., None], axis=-2)
     p = at - places[..., :, None, :]
@@ -75,13 +75,13 @@ def links(places: Float64, neighbour_indices: Int32, gains: BioInspiredGains) ->
 
 
 def forces(places: Float64, neighbour_indices: Int32, gains: BioInspiredGains) -> Float64:
-    """Force of the law on every vehicle [N], in the leg's frame, shape (..., vehicle, 2). Eq. 18-20."""
+    """Force of the controller on every vehicle [N], in the leg's frame, shape (..., vehicle, 2). Eq. 18-20."""
     p, weight, _ = links(places, neighbour_indices, gains)
     return -gains.zeta_l * places + (weight[..., None] * p).sum(axis=-2)
 
 
 def stiffness(places: Float64, neighbour_indices: Int32, gains: BioInspiredGains) -> Float64:
-    """How forces change with places [N/m], shape (2 vehicle, 2 vehicle): one world, frozen sets."""
+    """Derivative of the forces by the places [N/m], shape (2 vehicle, 2 vehicle), with frozen sets."""
     n, each = len(neighbour_indices), np.arange(len(neighbour_indices))
     p, weight, slope = links(places, neighbour_indices, gains)
     block = weight[..., None, None] * np.eye(2) + slope[..., None, None] * p[..., :, None] * p[..., None, :]
@@ -104,7 +104,7 @@ def formations(
 
     Args:
         scenario: one straight leg to the north, see ``straight_leg``.
-        gains: of the law.
+        gains: of the controller.
         seeds: of the starts; one formation each.
         rounds: relaxation steps towards a formation.
     """
@@ -136,7 +136,7 @@ def formations(
 
 
 def _detected_indices(swarm: Swarm, places: Float64) -> Int32:
-    """Whom vehicles at these places hear, bows to the north, shape (world, vehicle, sector)."""
+    """Indices of the vehicles detected at these places, headings north, shape (world, vehicle, sector)."""
     swarm.state.eta[:, :, :2], swarm.state.eta[:, :, 2] = places, 0.0
     swarm.observe()
     return swarm.detected_index.copy()
@@ -148,13 +148,9 @@ def _rms(force: Float64) -> Float64:
 
 
 def _solve(places: Float64, neighbour_indices: Int32, push: Float64, gains: BioInspiredGains) -> Float64:
-    """Places of balance with these sets by Newton's method; where it leaves for elsewhere, the last within reach.
+    """Places of balance [m] with frozen sets by Newton's method, within ``_WITHIN_M`` of ``places`` (vehicle, 2).
 
-    Args:
-        places: where to begin, relative to l(t) [m], shape (vehicle, 2).
-        heard: index of the vehicle heard, -1 for none, shape (vehicle, sector); held.
-        push: force that every vehicle needs against the drag, ahead and to starboard [N], shape (2,).
-        gains: of the law.
+    ``neighbour_indices`` has shape (vehicle, sector); ``push`` is the force against the drag [N], shape (2,).
     """
     now = places
     for _ in range(_NEWTON_ROUNDS):

@@ -1,4 +1,4 @@
-"""Changes to the paper's law that may let a swarm come to rest: a smooth gate, a dead zone, surge damping."""
+"""Changes to the paper's controller that may let a swarm come to rest: smooth neighbours, surge damping."""
 
 import math
 from typing import NamedTuple
@@ -12,26 +12,22 @@ from uuv_marl.types import Float32, Float64
 
 
 class Softening(NamedTuple):
-    """Changes to the paper's law, each off by default."""
+    """Changes to the paper's controller, each off by default."""
 
     near_m: float = math.inf
-    """Neighbours within this distance count in full ..."""
+    """Distance up to which neighbours count in full [m]."""
     far_m: float = math.inf
-    """... and those beyond this not at all, with a smooth step between."""
-    torque_gate_n: float = 0.0
-    """Torque is multiplied by F^2 / (F^2 + this^2), so that it fades where the force F fades [N]."""
-    dead_zone_n: float = 0.0
-    """The force is shortened by this, to 0 where it is smaller [N]."""
+    """Distance from which they do not count [m], with a smooth step between."""
     surge_damping: float = 0.0
     """Thrust against surge relative to the reference's velocity [N s/m]."""
 
 
 PAPER = Softening()
-"""The law as it is."""
+"""The unchanged controller."""
 
 
 class Softened(BioInspired):
-    """The paper's law with a ``Softening``, in NumPy; without one it is ``BioInspired`` with an echo per beam.
+    """The paper's controller with a ``Softening``, in NumPy; without one it equals ``BioInspired``, an echo per beam.
 
     Args:
         scenario: gives the vehicle's limits and the percept's layout.
@@ -60,9 +56,6 @@ class Softened(BioInspired):
         force = g.zeta_l * percept["reference"].astype(np.float64) + (weight[..., None] * neighbour).sum(axis=-2)
         weight = -g.zeta_o * _bounded_exp(g.delta_o, echo) * (percept["echo"] > 0)
         force += (weight[..., None] * echo).sum(axis=-2)
-        length = np.maximum(np.hypot(force[..., 0], force[..., 1]), 1e-9)
-        force *= np.maximum(1.0 - soft.dead_zone_n / length, 0.0)[..., None]
-        force[..., 1] *= length**2 / (length**2 + soft.torque_gate_n**2)
         force[..., 0] -= soft.surge_damping * (percept["velocity"] - percept["reference_velocity"])[..., 0]
         action = force * (1.0 / limits.max_force, limits.lever_arm / limits.max_torque)
         action /= np.maximum(np.hypot(action[..., 0], action[..., 1]), 1.0)[..., None]

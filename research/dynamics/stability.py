@@ -1,4 +1,4 @@
-"""Stability of steady tracking: the paper's law (Eq. 18-22), linearised with frozen neighbour sets.
+"""Stability of steady tracking: the paper's controller (Eq. 18-22), linearised with frozen neighbour sets.
 
 A swarm moves along a straight leg at the reference's speed, all bows along the leg. Positions are relative to l(t),
 x ahead and y to starboard; a vehicle's state is (x, y, psi, u, v, r). Formations are sought in ``formation.py``.
@@ -15,7 +15,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.linalg import expm
-from scipy.optimize import brentq
 from threadpoolctl import threadpool_limits  # pyright: ignore[reportMissingTypeStubs]
 
 from research.columns import Columns, columns, groups, where
@@ -33,23 +32,14 @@ Complex128 = NDArray[np.complex128]
 SEEDS = (0, 1, 2, 3)
 """Starts from which formations are sought."""
 CONTROL_STEPS_S = (0.0, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.15, 0.2)
-"""Control holds t_r swept; 0 is feedback without delay."""
+"""Control steps t_r swept; 0 is feedback without delay."""
 SHOWN_CONTROL_STEPS_S = (0.0, 0.02, 0.05, 0.1)
-"""Control holds whose eigenvalues are tabled."""
+"""Control steps whose eigenvalues are tabled."""
 SWEEP_CONTROL_STEPS_S = (0.0, 0.1)
-"""Control holds at which the other parameters are swept."""
-SWEEPS: dict[str, tuple[float, ...]] = {
-    "zeta_n": (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6),
-    "delta_n": (20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0),
-    "yaw_damping_nms": (0.0, 60.0, 120.0, 200.0, 300.0, 400.0, 600.0),
-    "num_vehicles": (1.0, 2.0, 3.0, 4.0, 7.0, 12.0, 25.0, 54.0),
-}
-"""Other parameters swept, one at a time."""
-CRITICAL_DAMPING_NMS = (0.0, 60.0, 200.0)
-"""Yaw dampings whose critical control hold is tabled."""
-_CONTROL_STEP_COLOURS = {"continuous": BLUE, "t_r = 0.1 s": ORANGE, "control hold on the axis": BLACK}
-NEUTRAL_PER_S = 1e-6
-"""Growth rates smaller than this are none: a formation in balance may be turned about its centre for nothing."""
+"""Control steps at which the yaw damping is swept."""
+DAMPING_NMS = (0.0, 60.0, 120.0, 200.0, 300.0, 400.0, 600.0)
+"""Yaw dampings swept."""
+_CONTROL_STEP_COLOURS = {"continuous": BLUE, "t_r = 0.1 s": ORANGE, "control step on the axis": BLACK}
 WEAVING_RAD_PER_S = 1.0
 """Modes that turn faster than this are weaving; slower ones rearrange the formation."""
 
@@ -61,10 +51,6 @@ class Rates(NamedTuple):
     """Largest real part [1/s]; minus this is the margin."""
     weaving: float
     """The same among the modes that turn faster than ``WEAVING_RAD_PER_S``; NaN without any."""
-    unstable: int
-    """How many modes grow."""
-    neutral: int
-    """How many neither grow nor decay."""
 
 
 def vehicle_jacobians(scenario: Scenario) -> tuple[Float64, Float64]:
@@ -97,7 +83,7 @@ def feedback(scenario: Scenario, rigid: Float64) -> Float64:
 
 
 def loop(scenario: Scenario, rigid: Float64, control_step_s: float) -> Float64:
-    """The closed loop, shape (6 vehicle, 6 vehicle): the state's rate for a hold of 0, else its next sample.
+    """The closed loop, shape (6 vehicle, 6 vehicle): the state's rate for a control step of 0, else its next sample.
 
     Body forces are held for ``hold_s`` exactly (zero-order hold); the simulation's Runge-Kutta step differs from that
     by its fifth-order error.
@@ -120,41 +106,11 @@ def rates(values: Complex128) -> Rates:
     """What a spectrum [1/s] says, every mode counted."""
     real = values.real
     fast = real[np.abs(values.imag) > WEAVING_RAD_PER_S]
-    return Rates(
-        growth=float(real.max()),
-        weaving=float(fast.max()) if fast.size else np.nan,
-        unstable=int((real > NEUTRAL_PER_S).sum()),
-        neutral=int((np.abs(real) <= NEUTRAL_PER_S).sum()),
-    )
-
-
-def lone_stiffness(gains: BioInspiredGains) -> Float64:
-    """``stiffness`` of a vehicle without neighbours: the pull to l(t) alone."""
-    return -gains.zeta_l * np.eye(2)
-
-
-def critical_control_step_s(scenario: Scenario, rigid: Float64) -> float:
-    """Control hold above which weaving grows [s]; 0 where it grows without any, infinite where none up to 0.5 s does.
-
-    For a lone vehicle about 2 N_r / drag: the hold delays the yaw spring by half its length, which takes
-    drag hold / 2 off the yaw damping.
-    """
-
-    def growth(control_step_s: float) -> float:
-        return rates(eigenvalues(scenario, rigid, control_step_s)).weaving
-
-    if growth(0.0) > 0.0:
-        return 0.0
-    held = np.linspace(0.005, 0.5, 100)
-    beyond = next((h for h in held if growth(float(h)) > 0.0), None)
-    return np.inf if beyond is None else float(brentq(growth, beyond - 0.005, beyond, xtol=1e-6))
+    return Rates(growth=float(real.max()), weaving=float(fast.max()) if fast.size else np.nan)
 
 
 def tables(_suite: Suite, report: Share) -> Tables:
-    """``eigenvalues`` of the nominal swarm (first seed), ``margins``: growth rates as parameters change, ``critical``.
-
-    The last holds the control hold above which a vehicle alone weaves, by its yaw damping.
-    """
+    """``eigenvalues`` of the nominal swarm (first seed), ``margins``: growth rates as hold and yaw damping change."""
     # Two BLAS threads fight over a busy core, and round differently.
     with threadpool_limits(1, user_api="blas"):
         nominal = formations(straight_leg(), BioInspiredGains(), SEEDS)
@@ -165,21 +121,12 @@ def tables(_suite: Suite, report: Share) -> Tables:
             for value in eigenvalues(straight_leg(), rigid, control_step_s)
         ]
         rows: list[dict[str, Any]] = []
-        cases = [
-            (parameter, value) for parameter, values in {"t_r": CONTROL_STEPS_S, **SWEEPS}.items() for value in values
-        ]
-        for k, (parameter, value) in enumerate(cases):
-            rows += _margins(parameter, value, nominal)
+        cases = [("t_r", control_step_s, 0.0, control_step_s) for control_step_s in CONTROL_STEPS_S]
+        cases += [("yaw_damping_nms", c, c, step_s) for c in DAMPING_NMS for step_s in SWEEP_CONTROL_STEPS_S]
+        for k, case in enumerate(cases):
+            rows += _margins(*case, nominal)
             report((k + 1) / len(cases))
-        critical = [
-            {
-                "yaw_damping_nms": damping,
-                "lone_critical_hold_s": critical_control_step_s(alone, lone_stiffness(BioInspiredGains())),
-            }
-            for damping in CRITICAL_DAMPING_NMS
-            for alone in [straight_leg(1, yaw_damping_nms=damping)]
-        ]
-        return {"eigenvalues": columns(spectrum), "margins": columns(rows), "critical": columns(critical)}
+        return {"eigenvalues": columns(spectrum), "margins": columns(rows)}
 
 
 def loop_name(control_step_s: float) -> str:
@@ -187,73 +134,54 @@ def loop_name(control_step_s: float) -> str:
     return f"t_r = {control_step_s:g} s" if control_step_s > 0.0 else "continuous"
 
 
-def _margins(parameter: str, value: float, nominal: Sequence[Formation]) -> Iterator[dict[str, Any]]:
-    """Rows of ``margins`` for one value of one parameter: per control hold and seed."""
-    gains, equilibrium = BioInspiredGains(), nominal
-    scenario = straight_leg(yaw_damping_nms=value if parameter == "yaw_damping_nms" else 0.0)
-    if parameter == "num_vehicles":
-        scenario = straight_leg(round(value))
-    elif parameter in gains._fields:
-        gains = gains._replace(**{parameter: value})
-    if gains != BioInspiredGains() or scenario.swarm.num_vehicles != len(nominal[0].places):
-        equilibrium = formations(scenario, gains, SEEDS)
-    for control_step_s in (value,) if parameter == "t_r" else SWEEP_CONTROL_STEPS_S:
-        lone = rates(eigenvalues(scenario, lone_stiffness(gains), control_step_s))
-        for seed, formation in zip(SEEDS, equilibrium, strict=True):
-            rigid = stiffness(formation.places, formation.neighbour_indices, gains)
-            swarm = rates(eigenvalues(scenario, rigid, control_step_s))
-            yield {
-                "parameter": parameter, "value": value, "t_r_s": control_step_s, "seed": seed,
-                "growth_per_s": swarm.growth, "weaving_growth_per_s": swarm.weaving,
-                "unstable_modes": swarm.unstable, "neutral_modes": swarm.neutral,
-                "settled": int(formation.settled), "residual_n": formation.residual_n,
-                "lone_growth_per_s": lone.growth, "lone_weaving_growth_per_s": lone.weaving,
-            }  # fmt: skip
+def _margins(
+    parameter: str, value: float, damping_nms: float, control_step_s: float, nominal: Sequence[Formation]
+) -> Iterator[dict[str, Any]]:
+    """Rows of ``margins`` for one value of one parameter, one for each seed."""
+    scenario = straight_leg(yaw_damping_nms=damping_nms)
+    for seed, formation in zip(SEEDS, nominal, strict=True):
+        rigid = stiffness(formation.places, formation.neighbour_indices, BioInspiredGains())
+        swarm = rates(eigenvalues(scenario, rigid, control_step_s))
+        yield {
+            "parameter": parameter, "value": value, "t_r_s": control_step_s, "seed": seed,
+            "growth_per_s": swarm.growth, "weaving_growth_per_s": swarm.weaving,
+            "settled": int(formation.settled), "residual_n": formation.residual_n,
+        }  # fmt: skip
 
 
 def draw(computed: Tables) -> Figure:
     """Eigenvalues of the nominal swarm, and growth rates over each parameter; from the tables alone."""
-    figure, axes = panels(6, 3, (4.3, 4.0))
+    figure, axes = panels(3, 3, (4.3, 4.0))
     for k, ((name,), own) in enumerate(groups(computed["eigenvalues"], "loop").items()):
         axes[0].plot(own["real_per_s"], own["imaginary_rad_per_s"], ".", color=COLOURS[k], label=name)
     axes[0].axvline(0.0, color=BLACK, linewidth=0.8)
     axes[0].set(xlim=(-2.0, 1.5), xlabel="growth rate [1/s]", ylabel="angular rate [rad/s]")
     axes[0].set_ylim(0.0)
     axes[0].set_title("eigenvalues of the nominal swarm, first seed")
-    axes[0].legend(title="control hold")
-    for ax, (parameter, label) in zip(
-        axes[1:],
-        (
-            ("t_r", "control hold $t_r$ [s]"),
-            ("yaw_damping_nms", "yaw damping [N m s]"),
-            ("zeta_n", "weight of neighbours $\\zeta_n$ [N/m]"),
-            ("delta_n", "distance of neighbours $\\delta_n$ [m]"),
-            ("num_vehicles", "vehicles"),
-        ),
-        strict=True,
+    axes[0].legend(title="control step")
+    for ax, parameter, label in (
+        (axes[1], "t_r", "control step $t_r$ [s]"),
+        (axes[2], "yaw_damping_nms", "yaw damping [N m s]"),
     ):
         _draw_sweep(ax, computed["margins"], parameter)
         ax.set_xlabel(label)
-    axes[5].set_xscale("log")
     for which, colour in _CONTROL_STEP_COLOURS.items():
-        for whose, style in (("swarm", "-"), ("one vehicle", ":")):
-            axes[1].plot([], [], style, color=colour, label=f"{whose}, {which}")
+        axes[1].plot([], [], color=colour, label=which)
     for fill, words in (("full", "forces balance"), ("none", "no balance found")):
         axes[1].plot([], [], "o", color=GREY, fillstyle=fill, label=f"one seed: {words}")
-    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.legend(*axes[1].get_legend_handles_labels(), loc="outside lower center", ncols=5)
     return figure
 
 
 def _draw_sweep(ax: Axes, table: Columns, parameter: str) -> None:
-    """Growth rates over one parameter, of the swarm and of a vehicle alone."""
+    """Growth rates of the swarm over one parameter."""
     swept = where(table, parameter=parameter)
     by_control_step = {(None,): swept} if parameter == "t_r" else groups(swept, "t_r_s")
     for (control_step_s,), own in by_control_step.items():
         values, settled, growth = own["value"], own["settled"] > 0, own["growth_per_s"]
         colour = BLACK if control_step_s is None else _CONTROL_STEP_COLOURS[loop_name(control_step_s)]
         at = np.unique(values)
-        for rate, style in ((growth, "-"), (own["lone_growth_per_s"], ":")):
-            ax.plot(at, [rate[values == value].mean() for value in at], style, color=colour)
+        ax.plot(at, [growth[values == value].mean() for value in at], color=colour)
         for rows, fill in ((settled, "full"), (~settled, "none")):
             ax.plot(values[rows], growth[rows], "o", color=colour, fillstyle=fill)
     ax.axhline(0.0, color=BLACK, linewidth=0.8)

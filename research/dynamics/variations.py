@@ -1,4 +1,4 @@
-"""Beyond the paper: control hold and integration step, swarm size, lost vehicles. One picture and table each."""
+"""Beyond the paper: control step and integration step, swarm size, lost vehicles. One picture and table each."""
 
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
@@ -119,14 +119,14 @@ CLOCKS: dict[str, dict[str, object]] = {
     }
     for hold, step in _CLOCKS
 }  # fmt: skip
-"""A control hold and an integration step [s]; the policy decides at every hold."""
+"""A control step and an integration step [s]; the policy decides at every hold."""
 SIZES = {f"{n}": {"swarm.num_vehicles": n} for n in (10, 20, 54, 100, 200)}
 LOST = {
     f"{n}": {"losses.times_s": [round(float(t), 1) for t in np.linspace(30.0, 105.0, n)]} for n in (0, 6, 12, 24, 36)
 }
 """So many vehicles lost one by one, between 30 and 105 s: before, at and after the obstacle."""
 PARTS = (
-    variation("time-steps", "control hold [s] over integration step [s]", CLOCKS, OWN),
+    variation("time-steps", "control step [s] over integration step [s]", CLOCKS, OWN),
     variation("swarm-size", "vehicles", SIZES, OWN),
     variation("losses", "vehicles lost of 54", LOST, LOSSES),
 )

@@ -7,7 +7,7 @@ from string import Template
 import numpy as np
 
 from research.data import read_text
-from research.episodes import Row, measured, succeeded, write_rows
+from research.episodes import Row, grouped, measured, succeeded, write_rows
 from research.heldout.figures import draw_fields
 from research.heldout.sets import FIRST, GROUPS, SETS
 from uuv_marl.atomic import write_text
@@ -17,7 +17,7 @@ from uuv_marl.benchmark.tables import markdown_table
 _NOTHING = "–"
 _MAIN = "random_field"
 """The set of the second table and of the picture."""
-Found = Mapping[tuple[str, str], Sequence[Row]]
+Groups = Mapping[tuple[str, ...], Sequence[Row]]
 """Rows by policy and set."""
 
 
@@ -33,11 +33,9 @@ def write_page(folder: Path, rows: Sequence[Row]) -> list[Path]:
 
 def tables(rows: Sequence[Row]) -> tuple[str, str]:
     """How many episodes arrive untouched in each set, and what the episodes on random fields are like."""
-    rows_by_set: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        rows_by_set.setdefault((row["policy"], row["set"]), []).append(row)
-    policies = [name for group in GROUPS.values() for name in group if any(name == policy for policy, _ in rows_by_set)]
-    return _sets(rows_by_set, policies), _fields(rows_by_set, policies)
+    groups = grouped(rows, "policy", "set")
+    policies = [name for names in GROUPS.values() for name in names if any(name == policy for policy, _ in groups)]
+    return _sets(groups, policies), _fields(groups, policies)
 
 
 def report(rows: Sequence[Row]) -> str:
@@ -48,10 +46,10 @@ def report(rows: Sequence[Row]) -> str:
     )
 
 
-def _sets(rows_by_set: Found, policies: Sequence[str]) -> str:
+def _sets(groups: Groups, policies: Sequence[str]) -> str:
     """How many episodes arrive untouched: a row for each policy, a column for each set."""
-    names = [held.name for held in SETS if any(held.name == name for _, name in rows_by_set)]
-    rows = [(policy, *(_share(rows_by_set.get((policy, name), ())) for name in names)) for policy in policies]
+    names = [held.name for held in SETS if any(held.name == name for _, name in groups)]
+    rows = [(policy, *(_share(groups.get((policy, name), ())) for name in names)) for policy in policies]
     return markdown_table(("policy", *(name.removeprefix("random_field_") for name in names)), rows)
 
 
@@ -59,9 +57,9 @@ def _share(mine: Sequence[Row]) -> str:
     return f"{sum(map(succeeded, mine))}/{len(mine)}" if mine else _NOTHING
 
 
-def _fields(rows_by_set: Found, policies: Sequence[str]) -> str:
+def _fields(groups: Groups, policies: Sequence[str]) -> str:
     """What the episodes on random fields are like: a row for each policy."""
-    rows = [(policy, *_cells(mine)) for policy in policies if (mine := rows_by_set.get((policy, _MAIN), ()))]
+    rows = [(policy, *_cells(mine)) for policy in policies if (mine := groups.get((policy, _MAIN), ()))]
     head = ("policy", "arrived", "collided", "mean time [s]", "nearest obstacle [m]", "nearest vehicle [m]")
     return markdown_table(head, rows)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from research.episodes import Row, measured
+from research.episodes import Row, grouped, measured, select
 from research.learners.protocol import LEARNERS, TASKS
 from research.learners.statistics import profiles
 from uuv_marl.benchmark.style import panels
@@ -20,17 +20,15 @@ def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
     figure, axes = panels(len(TASKS), 3, (3.6, 2.8))
     for ax, (name, task) in zip(axes, TASKS.items(), strict=False):
         for k, learner in enumerate(LEARNERS):
-            runs: dict[str, list[Row]] = {}
-            for row in curves:
-                if (row["task"], row["learner"]) == (name, learner):
-                    runs.setdefault(row["training"], []).append(row)
-            length = min(map(len, runs.values()))
-            steps = (
-                np.mean([[float(row["agent_steps"]) for row in run[:length]] for run in runs.values()], axis=0) / 1e6
+            runs = grouped(select(curves, task=name, learner=learner), "training").values()
+            length = min(map(len, runs))
+            steps, share = (
+                np.array([measured(run[:length], column) for run in runs]) for column in ("agent_steps", "share")
             )
-            share = np.array([[float(row["share"]) for row in run[:length]] for run in runs.values()])
-            ax.plot(steps, share.mean(axis=0), color=f"C{k}", label=learner)
-            ax.fill_between(steps, share.min(axis=0), share.max(axis=0), color=f"C{k}", alpha=0.15, linewidth=0)
+            ax.plot(steps.mean(axis=0) / 1e6, share.mean(axis=0), color=f"C{k}", label=learner)
+            ax.fill_between(
+                steps.mean(axis=0) / 1e6, share.min(axis=0), share.max(axis=0), color=f"C{k}", alpha=0.15, linewidth=0
+            )
         controller = [row for row in rows if (row["learner"], row["set"]) == (task.policies[0], task.tiers[0][0].name)]
         ax.axhline(float(np.mean(measured(controller, "share"))), color="0.4", linestyle="--", label="best controller")
         ax.set(title=name, xlabel="million agent-steps", ylabel="headline", ylim=(-0.02, 1.02))

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from research.episodes import Row, measured
+from research.episodes import Row, grouped, measured
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MEASURES, TASKS
 
 ENVIRONMENT = "uuv_marl"
@@ -19,17 +19,11 @@ def marl_eval(curves: Sequence[Row], rows: Sequence[Row]) -> dict[str, Any]:
     stays at its last one. The absolute metrics are those of the best policy in the final episodes.
     """
     layout: dict[str, dict[str, dict[str, Any]]] = {task: {name: {} for name in LEARNERS} for task in TASKS}
-    runs: dict[tuple[str, str, str], list[Row]] = {}
-    for row in curves:
-        runs.setdefault((row["task"], row["learner"], row["training"]), []).append(row)
-    for (task, learner, training), run in runs.items():
+    for (task, learner, training), run in grouped(curves, "task", "learner", "training").items():
         layout[task][learner][f"seed_{training}"] = {f"step_{k}": _at(step, run) for k, step in enumerate(_STEPS)}
     first = {task: each.tiers[0][0].name for task, each in TASKS.items()}
-    final: dict[tuple[str, str, str], list[Row]] = {}
-    for row in rows:
-        if row["training"] and row["set"] == first[row["task"]]:
-            final.setdefault((row["task"], row["learner"], row["training"]), []).append(row)
-    for (task, learner, training), mine in final.items():
+    final = [row for row in rows if row["training"] and row["set"] == first[row["task"]]]
+    for (task, learner, training), mine in grouped(final, "task", "learner", "training").items():
         layout[task][learner][f"seed_{training}"]["absolute_metrics"] = _means(mine)
     return {ENVIRONMENT: layout}
 

@@ -12,9 +12,10 @@ from research.paper.cases import BY_NAME, SCENARIOS
 from research.paper.claims import CLAIMS, Claim, stated
 from uuv_marl.atomic import write_text
 from uuv_marl.baselines.paper.bio_inspired import BioInspiredGains
+from uuv_marl.benchmark.estimates import Estimate, estimate
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.suite import Case, Suite
-from uuv_marl.benchmark.tables import Estimate, estimate, markdown_table
+from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.types import Float64
 
 CLOSE, NEAR = 0.05, 0.15
@@ -97,7 +98,7 @@ def number_entry(number: Number, values: Float64) -> Entry:
     if not finite.size:
         return row._replace(verdict="differs", why="no seed has a value")
     e = estimate(finite.tolist())
-    relative, worst = difference(e.iqm, number.paper), finite.max() if number.unit == "s" else finite.min()
+    relative, worst = difference(e.value, number.paper), finite.max() if number.unit == "s" else finite.min()
     why = "" if abs(relative) <= CLOSE else number.why
     if finite.size < values.size:
         why = f"{values.size - finite.size} of {values.size} seeds never arrive; {why}"
@@ -116,7 +117,7 @@ def claim_entry(claim: Claim, values: Float64) -> Entry:
     if not finite.size:
         return row
     e, worst = estimate(finite.tolist()), finite[np.argmin(np.minimum(finite - claim.least, claim.most - finite))]
-    return row._replace(ours=e.iqm, low=e.low, high=e.high, worst=float(worst))
+    return row._replace(ours=e.value, low=e.low, high=e.high, worst=float(worst))
 
 
 def _limits(claim: Claim) -> str:
@@ -170,9 +171,7 @@ def assumption_entries() -> list[Entry]:
     rows = [
         *((one.name, one.taken, one.in_view) for one in ASSUMPTIONS),
         ("the identified parameters, beside these", "research/dynamics/identified", searched),
-        ("the hypothesis post hoc, beside these", "obstacles detected from 190 m, 45 vehicles in 5.1",
-         "5.1 both, 5.2.1, 5.2.2 both, Table 2"),
-    ]  # fmt: skip
+    ]
     return [
         Entry("", "assumption", what, "", "silent", taken, verdict=f"in view: {seen}") for what, taken, seen in rows
     ]
@@ -202,10 +201,7 @@ _KINDS = {
     "number": ("Numbers", "section, quantity, unit, paper, ours, worst, difference, verdict"),
     "claim": ("Claims", "no., section, the paper says, holds, ours, worst, verdict"),
     "given": ("Values that the paper gives", "section, quantity, unit, paper, ours, verdict"),
-    "assumption": (
-        "Assumptions",
-        "quantity, our choice, the paper's numbers that were known",
-    ),
+    "assumption": ("Assumptions", "quantity, our choice, the paper's numbers that were known"),
 }
 """Title and headers of each kind's table."""
 

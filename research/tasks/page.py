@@ -6,16 +6,16 @@ from string import Template
 import numpy as np
 
 from research.data import read_text
-from research.episodes import Row, measured, short
+from research.episodes import Row, grouped, measured, short
 from research.second import runnable
 from research.tasks.studies import STUDIES, Study, set_name
-from uuv_marl.baselines.making import uses_identity
-from uuv_marl.baselines.registry import is_trained, policy_class
+from uuv_marl.baselines.making import policy_requirements
+from uuv_marl.baselines.registry import is_trained
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.scenario import load_scenario
 from uuv_marl.types import Float64
 
-Found = Mapping[tuple[str, str], Sequence[Row]]
+Groups = Mapping[tuple[str, ...], Sequence[Row]]
 """Rows by policy and set."""
 Columns = Mapping[str, Sequence[str]]
 """Sets by the header of their column."""
@@ -41,23 +41,19 @@ def report(task: str, rows: Sequence[Row]) -> str:
         task: a name of ``STUDIES``.
         rows: episodes, as ``TASK.csv.gz`` holds them.
     """
-    rows_by_set: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        rows_by_set.setdefault((row["policy"], row["set"]), []).append(row)
+    groups = grouped(rows, "policy", "set")
     study = STUDIES[task]
     kinds = {name.split("-")[1]: [name] for name in study.own if "-" in name}
     return Template(read_text("tasks", "stories", f"{task}.md")).substitute(
         episodes=f"{sum(row['set'] not in study.final.values() for row in rows):,}",
-        tiers=_shares(rows_by_set, study, _tiers(task)),
-        kinds=_measures(rows_by_set, study, kinds),
-        measures=_measures(rows_by_set, study, {}),
+        tiers=_shares(groups, study, _tiers(task)),
+        kinds=_measures(groups, study, kinds),
+        measures=_measures(groups, study, {}),
         many=_measures(
-            rows_by_set, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
+            groups, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
         ),
-        final=_final(rows_by_set, study),
-        informed=_shares(
-            rows_by_set, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "success_share"
-        ),
+        final=_final(groups, study),
+        informed=_shares(groups, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "success_share"),
     )
 
 
@@ -69,23 +65,23 @@ def _tiers(task: str) -> Columns:
     }
 
 
-def _shares(rows_by_set: Found, study: Study, columns: Columns, share: str = "") -> str:
+def _shares(groups: Groups, study: Study, columns: Columns, share: str = "") -> str:
     """The headline, or another ``share``, with its interval, and swarm success, for policies that ran on all sets."""
     share = share or study.headline
     table = [
         (named(policy), *(f"{_with_interval(_values(mine, share))}, {_mean(mine, 'swarm_success')}" for mine in cells))
-        for policy in _policies(rows_by_set)
-        if (cells := _cells(rows_by_set, policy, columns))
+        for policy in _policies(groups)
+        if (cells := _cells(groups, policy, columns))
     ]
     return markdown_table(("policy", *columns), table)
 
 
-def _measures(rows_by_set: Found, study: Study, columns: Columns) -> str:
+def _measures(groups: Groups, study: Study, columns: Columns) -> str:
     """The headline and the swarm success in each column, or of the medium tier, and other measures."""
     table: list[tuple[str, ...]] = []
-    for policy in _policies(rows_by_set):
+    for policy in _policies(groups):
         cells = [
-            rows_by_set.get((policy, name), ()) for names in ([*columns.values()] or [[study.medium]]) for name in names
+            groups.get((policy, name), ()) for names in ([*columns.values()] or [[study.medium]]) for name in names
         ]
         if every := [row for rows in cells for row in rows]:
             shares = [
@@ -110,11 +106,11 @@ def _size(row: Row) -> int:
     return int(last) if last.isdigit() else load_scenario(scenario).swarm.num_vehicles
 
 
-def _final(rows_by_set: Found, study: Study) -> str:
+def _final(groups: Groups, study: Study) -> str:
     """The headline and the swarm success on the final seeds, and a network's gain over the best controller there."""
     heads, table = ["policy"], dict[str, list[str]]()
     for scenario, name in study.final.items():
-        mine = {policy: rows for (policy, where), rows in rows_by_set.items() if where == name}
+        mine = {policy: rows for (policy, where), rows in groups.items() if where == name}
         shares = {policy: np.array(measured(rows, study.headline)) for policy, rows in mine.items()}
         controllers = [
             policy for policy in mine
@@ -131,17 +127,18 @@ def _final(rows_by_set: Found, study: Study) -> str:
 
 def named(policy: str) -> str:
     """A policy with its extra observations."""
-    beyond = [*policy_class(runnable(policy)).channels, *(["identity"] if uses_identity(runnable(policy)) else [])]
+    required = policy_requirements(runnable(policy))
+    beyond = [*required.channels, *(["identity"] if required.identity else [])]
     return f"{policy} with {', '.join(beyond)}" if beyond else policy
 
 
-def _policies(rows_by_set: Found) -> list[str]:
-    return list(dict.fromkeys(policy for policy, _ in rows_by_set))
+def _policies(groups: Groups) -> list[str]:
+    return list(dict.fromkeys(policy for policy, _ in groups))
 
 
-def _cells(rows_by_set: Found, policy: str, columns: Columns) -> list[list[Sequence[Row]]]:
+def _cells(groups: Groups, policy: str, columns: Columns) -> list[list[Sequence[Row]]]:
     """The rows of a policy in each set of each column; nothing if some are missing."""
-    cells = [[rows_by_set.get((policy, name), ()) for name in names] for names in columns.values()]
+    cells = [[groups.get((policy, name), ()) for name in names] for names in columns.values()]
     return cells if all(rows for mine in cells for rows in mine) else []
 
 

@@ -142,7 +142,7 @@ def test_the_page_tells_learners_apart_where_they_are_and_comes_again_alike(monk
     for task in TASKS:
         (row,) = [line for line in text.splitlines() if line.startswith(f"| {task} |") and " over " in line]
         assert all(f"ISAC over {other}" in row for other in LEARNERS if other != "ISAC")
-    assert not any(" over " in row for row in page._apart(page.grouped_rows(alike(rows))).splitlines())
+    assert not any(" over " in row for row in page._apart(page.by_training(alike(rows))).splitlines())
 
 
 def test_the_page_shows_the_trainings_that_all_learners_have():
@@ -154,7 +154,7 @@ def test_the_page_shows_the_trainings_that_all_learners_have():
     shown = page.complete(lacking, rows)
     assert {row["training"] for row in shown[0]} == {"0", "1", "2"}
     assert {row["training"] for row in shown[1]} == {"", "0", "1", "2"}
-    assert "too few for a comparison" in page._apart(page.grouped_rows(shown[1]))
+    assert "too few for a comparison" in page._apart(page.by_training(shown[1]))
 
 
 def test_the_shipped_page_and_file_are_made_of_the_shipped_rows():
@@ -167,7 +167,7 @@ def test_the_shipped_page_and_file_are_made_of_the_shipped_rows():
 def test_what_the_page_finds_is_in_the_shipped_rows():
     files = ("research/learners/curves.csv.gz", "docs/learners.csv.gz")
     curves, rows = page.complete(*(read_rows(FOLDER / file) for file in files))
-    found = page.grouped_rows(rows)
+    found = page.by_training(rows)
     every = page.scores(found)
     laws = {name: float(page._values(found, name, task.policies[0])[0, 0]) for name, task in TASKS.items()}
     means = {who: dict(zip(TASKS, own.mean(axis=0), strict=True)) for who, own in every.items()}

@@ -17,15 +17,15 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float32
 
 BATCH = 8
-"""Seeds stepped together: enough for all cores, and few to repeat after a benchmark was stopped."""
+"""Seeds stepped together: enough for all cores, and few to repeat after a benchmark is stopped."""
 ROUTE_PERIOD_S = 0.5
-"""Time between two samples of the routes [s]."""
+"""Time between two samples of the trajectories [s]."""
 MOST_SAMPLES = 1_500_000
-"""Most samples (times x vehicles) of a run's routes; longer or larger runs are sampled less often."""
+"""Most samples (times x vehicles) of a run's trajectories; larger runs are sampled less often."""
 
 
 class Routes(NamedTuple):
-    """Positions of all vehicles, from start to end; NaN once a vehicle is lost. The frame is north, east."""
+    """Trajectories of all vehicles, from start to end, in the frame north, east; NaN once a vehicle is lost."""
 
     time_s: Float32
     """Shape (time,): every ``ROUTE_PERIOD_S`` (see ``MOST_SAMPLES``), and the end."""
@@ -45,23 +45,23 @@ class Run(NamedTuple):
     series: dict[str, Float32]
     """Samples over time, see ``MetricsRecorder.series``."""
     routes: Routes
-    """Routes of all vehicles, sampled in time."""
+    """Trajectories of all vehicles."""
     obstacles: Float32
-    """Centre north, east and radius [m], at the end, shape (obstacle, 3)."""
+    """Centre north, east and radius at the end [m], shape (obstacle, 3)."""
     waypoints: Float32
-    """Corners of the trajectory [m], shape (point, 2)."""
+    """Corners of the reference trajectory [m], shape (point, 2)."""
 
 
 class Progress(NamedTuple):
     """The progress of an evaluation."""
 
     share: float
-    """Share of the simulated time that all seeds need at most."""
+    """Share of the largest possible simulated time of all seeds."""
 
 
 Watch = Callable[[Swarm, Float32 | None], None]
-"""Called with the swarm after its reset and after every step, and with the actions that led there, shape
-(world, vehicle, 2), None after the reset. It may only look, and must copy what it keeps."""
+"""Called with the swarm after its reset and after every step, and with the preceding actions (world, vehicle, 2), None
+after the reset. It must not change the arrays, and must copy those that it keeps."""
 
 
 def episodes(
@@ -121,7 +121,7 @@ def evaluate(
 
 @contextmanager
 def blaming(policy: str) -> Generator[None]:
-    """Turn what a user's own policy makes ``episodes`` raise into a PolicyError that names it."""
+    """Turn an error caused by a user's own policy into a PolicyError that names it."""
     try:
         yield
     except (TypeError, ValueError) as error:
@@ -137,7 +137,7 @@ def _look_away(swarm: Swarm, action: Float32 | None) -> None:
 def _batch(
     scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch, parameters: dict[str, object]
 ) -> Iterator[Run | Progress]:
-    """The episodes of seeds that are stepped together."""
+    """Episodes of seeds that are stepped together."""
     swarm = Swarm(scenario, len(seeds))
     actor = make_policy(policy, scenario, len(seeds), **parameters)
     percept = swarm.reset(list(seeds))
@@ -184,7 +184,7 @@ def _batch(
 
 
 def _sample(swarm: Swarm) -> tuple[Float32, Float32]:
-    """Time (world,) and position, heading and velocity of everybody (world, vehicle, 5)."""
+    """Time (world,), and position, heading and velocity of all vehicles (world, vehicle, 5)."""
     eta, (u, v) = swarm.state.eta, np.moveaxis(swarm.velocity, -1, 0)
     cos, sin = np.moveaxis(swarm.heading, -1, 0)
     motion = np.stack([eta[:, :, 0], eta[:, :, 1], eta[:, :, 2], cos * u - sin * v, sin * u + cos * v], axis=2)
@@ -193,7 +193,7 @@ def _sample(swarm: Swarm) -> tuple[Float32, Float32]:
 
 
 def _routes(swarm: Swarm, samples: Sequence[tuple[Float32, Float32]], w: int) -> Routes:
-    """The routes of a world that ends now."""
+    """The trajectories of a world that ends now."""
     time, motion = zip(*((t[w], m[w]) for t, m in [*samples, _sample(swarm)]), strict=True)
     moved = np.array(motion, np.float32)
     return Routes(np.array(time, np.float32), moved[:, :, :2], moved[:, :, 2], moved[:, :, 3:])

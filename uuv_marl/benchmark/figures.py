@@ -1,4 +1,4 @@
-"""The benchmark's pictures, a panel for each policy: routes, distance to obstacles and spacing over time."""
+"""The benchmark's pictures, a panel for each policy: trajectories, distance to obstacles and spacing over time."""
 
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
@@ -31,7 +31,7 @@ _TICKS_M = (-20, -10, -5, 0, 5, 10, 20, 50, 100, 200)
 
 
 def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Sequence[int]) -> list[Path]:
-    """All pictures of a scenario, as PNG in ``figures/``; the paths."""
+    """Draw all pictures of a scenario as PNG in ``figures/``; return their paths."""
     present = [policy for policy in policies if results.select(scenario, policy, seeds)]
     if not present:
         return []
@@ -64,7 +64,7 @@ def draw_all(results: Results, scenario: str, policies: Sequence[str], seeds: Se
 
 
 def _where(scenario: Scenario, seeds: str) -> str:
-    """What a picture is of; in a second line what disturbs it, if anything does."""
+    """Scenario, vehicles and seeds of a picture; disturbances in a second line."""
     conditions_line = f"\n{conditions(scenario)}" if disturbances(scenario) else ""
     return (
         f"{scenario.name}, {scenario.swarm.num_vehicles} vehicles ({scenario.vehicle.name}), {seeds}{conditions_line}"
@@ -72,7 +72,7 @@ def _where(scenario: Scenario, seeds: str) -> str:
 
 
 def _grid(num: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    """Panels on common axes, and at least one empty one at the end for the legend."""
+    """Panels on common axes, with at least one empty panel for the legend."""
     rows = -(-(num + 1) // 4)
     figure, axes = panels(num + 1, -(-(num + 1) // rows), size, sharex=True, sharey=True)
     for ax in axes[num:]:
@@ -103,7 +103,7 @@ def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
             lines.set_clim(0.0, longest)
         if not groups.informed.all():
             lines.set_linewidth(np.where(groups.informed, 1.5, 0.5).tolist() * len(legs))
-            ax.plot([], [], color=BLACK, linewidth=1.5, label="thick: perceives l(t)")
+            ax.plot([], [], color=BLACK, linewidth=1.5, label="thick: observes l(t)")
         ax.add_collection(lines)
         for k, (team, corners) in enumerate(groups.paths.values()):
             discs = trace["obstacles"][: 0 if k else None, [1, 0, 2]]
@@ -112,15 +112,15 @@ def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
             place, fill = trace["route_position"][k, groups.team == team], "none" if mark == "o" else colour
             name = label if len(colours) == 1 else f"{label} of group {team + 1}"
             ax.plot(*place.T[::-1], mark, color=colour, mfc=fill, ms=3, mew=0.5, label=name)
-        contacts = _collisions_of(trace, hull_m)
-        ax.plot(*contacts.T[::-1], "x", color=ORANGE, ms=8, mew=2.0, zorder=6, label="collision")
+        collisions = _collisions_of(trace, hull_m)
+        ax.plot(*collisions.T[::-1], "x", color=ORANGE, ms=8, mew=2.0, zorder=6, label="collision")
         ax.set_title(f"{policy[-28:]}\n{_outcome(results.select(scenario, policy, [0])[0].metrics)}")
     figure.supxlabel("east [m]")
     figure.supylabel("north [m]")
-    figure.suptitle(f"Routes of each policy: {_where(results.scenarios[scenario], 'seed 0')}")
+    figure.suptitle(f"Trajectories of each policy: {_where(results.scenarios[scenario], 'seed 0')}")
     if lines is not None and len(colours) == 1:
         bar = axes[-1].inset_axes((0.1, 0.12, 0.8, 0.05))
-        figure.colorbar(lines, cax=bar, orientation="horizontal", label="colour of routes: time [s]")
+        figure.colorbar(lines, cax=bar, orientation="horizontal", label="colour of trajectories: time [s]")
     named = dict(zip(*axes[0].get_legend_handles_labels()[::-1], strict=True))
     axes[-1].legend(named.values(), named.keys(), loc="upper center", fontsize=9)
     return figure
@@ -129,19 +129,16 @@ def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
 def _outcome(metrics: Mapping[str, Any]) -> str:
     time, collisions, own = metrics["task_time_s"], metrics["collisions"], metrics.get("task")
     if own is not None and (share := own.get("success_share")) is not None:
-        arrived = f"{share:.0%} untouched and there"
+        arrived = f"success {share:.0%}"
     else:
         arrived = "never arrives" if time is None else f"arrives after {time:.0f} s"
     return f"{arrived}, {collisions or 'no'} collision{'' if collisions == 1 else 's'}"
 
 
 def _collisions_of(trace: Trace, hull_m: float) -> Float32:
-    """Where contacts begin, shape (contact, 2): the vehicle that is nearest to another, or to an obstacle."""
+    """Places where collisions begin, shape (collision, 2): the vehicle nearest to another or to an obstacle."""
     points: list[Float32] = []
-    for distance, limit, of_pair in (
-        (trace["min_spacing_m"], 2.0 * hull_m, True),
-        (_nearest(trace), hull_m, False),
-    ):
+    for distance, limit, of_pair in ((trace["min_spacing_m"], 2.0 * hull_m, True), (_nearest(trace), hull_m, False)):
         below = distance < limit
         for time in trace["time_s"][below & ~np.append(np.False_, below[:-1])]:
             place = trace["route_position"][np.argmin(np.abs(trace["route_time_s"] - time))]
@@ -150,7 +147,7 @@ def _collisions_of(trace: Trace, hull_m: float) -> Float32:
             else:
                 discs = trace["obstacles"]
                 gap = np.linalg.norm(place[:, None] - discs[:, :2], axis=-1) - discs[:, 2]
-            points.append(place[np.argmin(np.nan_to_num(gap, nan=np.inf).min(axis=1))])  # the lost are nowhere
+            points.append(place[np.argmin(np.nan_to_num(gap, nan=np.inf).min(axis=1))])  # lost vehicles are NaN
     return np.array(points, np.float32).reshape(-1, 2)
 
 
@@ -163,9 +160,9 @@ def _nearest(trace: Trace) -> Float32:
 def _over_time(
     curves: Mapping[str, Sequence[Trace]], value: Callable[[Trace], Float32], limits: Mapping[str, float], what: str
 ) -> tuple[Figure, list[Axes]]:
-    """Median and range over seeds, a panel for each policy with all others' medians behind; the used panels.
+    """Median and range over seeds, a panel for each policy, with the other medians in grey; the used panels.
 
-    ``value`` of a run has shape (time,); ``limits`` are lines across all panels [m], by their words in the legend.
+    ``value`` of a run has shape (time,); ``limits`` are lines across all panels [m], by their labels.
     """
     figure, axes = _grid(len(curves), (3.1, 2.7))
     bands = {policy: _band([(trace["time_s"], value(trace)) for trace in traces]) for policy, traces in curves.items()}
@@ -185,7 +182,7 @@ def _over_time(
 
 
 def _band(series: Sequence[tuple[Float32, Float32]]) -> tuple[Float64, ...]:
-    """Time, lowest, median and highest, as long as more than half of the seeds are under way."""
+    """Time, lowest, median and highest value, shape (time,) each, while more than half of the seeds run."""
     grid = np.arange(0.0, max(float(time[-1]) for time, _ in series), _GRID_S)
     curves = np.array([np.interp(grid, time, values, right=np.nan) for time, values in series])
     sampled = np.isfinite(curves).sum(axis=0) > len(series) / 2

@@ -10,7 +10,7 @@ from uuv_marl.paths import UserPath, user_path
 
 
 def import_pandas(feature: str) -> Any:
-    """Pandas, which comes with an extra. Raises MissingExtraError, which names who needs it."""
+    """Import pandas. Raises MissingExtraError, which names the feature that needs it."""
     with extra("analysis", feature):
         return importlib.import_module("pandas")
 
@@ -21,14 +21,14 @@ def load(path: UserPath) -> Any:
     Columns are ``scenario``, ``policy``, ``seed``, every metric (``constraint_share`` as ``constraint_share_all``,
     ``constraint_share_s_l`` and so on), those of the task by their names, such as ``success_share``, with
     ``task_`` before a name that is taken, and ``trace``, the path of the run's time series for ``load_trace``. NaN
-    means that there was nothing to measure. No policy is imported.
+    stands for a value that does not exist. No policy is imported.
 
     Args:
-        path: of the file, or of the folder that holds it.
+        path: the file, or the folder that holds it.
 
     Raises:
         MissingExtraError: pandas is not installed.
-        ResultsError: the file is no results.json of this version.
+        ResultsError: the file is not a results.json of this version.
     """
     pandas = import_pandas("uuv_marl.benchmark.load")
     path = user_path(path)

@@ -1,6 +1,6 @@
-"""How a vehicle swims, alone in still water: what the list of vehicles shows, by the engine's own equations.
+"""Top speed and turning of a vehicle in still water, for the list of vehicles, by the simulator's equations.
 
-Its lags count. It is integrated with the longest step that is accepted for it.
+Actuator lags are included. The integration step is the longest that the vehicle accepts.
 """
 
 import json
@@ -13,13 +13,13 @@ from uuv_marl.sim.disturbances.actuation import actuation, followed
 from uuv_marl.sim.vehicle import STILL, State6, actuators, advance_lagging, plant
 
 STEPS_S = (0.1, 0.05, 0.025, 0.0125, 0.00625)
-"""Integration steps that are tried, the first is the paper's."""
+"""Integration steps to try; the first is the paper's."""
 SETTLE_S = 120.0
-"""Time after which a vehicle from rest is steady; the slowest, by its drag, needs half of it."""
+"""Time in which a vehicle from rest reaches a steady state; the slowest one needs half of it."""
 
 
 def alone(vehicle: str, **overrides: object) -> Scenario:
-    """A scenario of one vehicle, with the longest integration step that is accepted.
+    """A scenario of one vehicle, with the longest integration step that it accepts.
 
     Args:
         vehicle: a name with its variants, or a file, as for ``load_vehicle``.
@@ -39,13 +39,13 @@ def alone(vehicle: str, **overrides: object) -> Scenario:
 
 
 def swim(scenario: Scenario, action: tuple[float, float], seconds: float, speed_mps: float = 0.0) -> Iterator[State6]:
-    """States (x, y, psi, u, v, r) of a vehicle after every integration step; it begins straight ahead, without forces.
+    """States (x, y, psi, u, v, r) of a vehicle after every integration step, from straight motion without forces.
 
     Args:
         scenario: gives the vehicle and the step.
-        action: shares of full thrust, and of full torque or rudder, asked for all the time.
-        seconds: how long.
-        speed_mps: at the start.
+        action: constant shares of full thrust, and of full torque or rudder.
+        seconds: duration.
+        speed_mps: initial speed.
     """
     p, numbers, h = plant(scenario), actuation(scenario), scenario.timing.integration_step_s
     now: State6 = (0.0, 0.0, 0.0, speed_mps, 0.0, 0.0)
@@ -60,12 +60,12 @@ def swim(scenario: Scenario, action: tuple[float, float], seconds: float, speed_
 
 
 def _turn(scenario: Scenario) -> tuple[float, float]:
-    """The action of the turn at the limits."""
+    """The action of the tightest turn."""
     return (1.0, 1.0) if scenario.actuators.kind == "rudder" else (0.0, 1.0)
 
 
 def turn(scenario: Scenario) -> tuple[float, float, float]:
-    """Top speed [m/s], and rate [deg/s] and radius [m] of the turn at the limits."""
+    """Top speed [m/s], and rate [deg/s] and radius [m] of the tightest turn."""
     top, turning = last(scenario, (1.0, 0.0), SETTLE_S), last(scenario, _turn(scenario), SETTLE_S)
     return top[3], math.degrees(turning[5]), math.hypot(turning[3], turning[4]) / abs(turning[5])
 
@@ -82,7 +82,7 @@ def every() -> list[str]:
 
 
 def changes(vehicle: str) -> list[str]:
-    """``field = value`` of what the variants in a vehicle's name change."""
+    """``field = value`` of the fields that the variants in a vehicle's name change."""
     plain, now = load_vehicle(vehicle.partition("+")[0]), load_vehicle(vehicle)
     return [
         f"{field} = {value if isinstance(value, str) else json.dumps(value)}"

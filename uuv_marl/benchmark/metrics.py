@@ -1,4 +1,4 @@
-"""The metrics, one definition each. Distances are taken from the start to the episode's end."""
+"""Definitions of the metrics. Distances are taken from the start to the end of an episode."""
 
 from typing import NamedTuple, NotRequired
 
@@ -20,7 +20,7 @@ class Metrics(Measures, Success):
 
 
 class Sample(NamedTuple):
-    """The measures of one step of every world, shape (world,) each, lengths in m."""
+    """Measures of one step, shape (world,) each, lengths in m."""
 
     time_s: Float64
     min_spacing_m: Float64
@@ -38,13 +38,13 @@ class Sample(NamedTuple):
     within_s_u: Float64
     """1 where all vehicles keep s_u from each other. Eq. 7."""
     effort: Float64
-    """Mean squared action of the living, share of full force."""
+    """Mean squared action of the vehicles that are not lost, as a share of full force."""
     saturation: Float64
     """Share of actions at the actuators' limit."""
 
 
 def measure(swarm: Swarm) -> Sample:
-    """The sample of a swarm in its present state."""
+    """The sample of a swarm in its current state."""
     facts, state, constraints = swarm.facts, swarm.state, swarm.scenario.constraints
     alive = state.alive
     living = np.maximum(alive.sum(axis=1), 1)
@@ -66,7 +66,7 @@ def measure(swarm: Swarm) -> Sample:
 
 
 class MetricsRecorder:
-    """Gathers samples of a batch of worlds, and gives a world's metrics when its episode ends."""
+    """Collects samples of a batch of worlds, and computes a world's metrics at the end of its episode."""
 
     def __init__(self, swarm: Swarm) -> None:
         self._swarm = swarm
@@ -91,7 +91,7 @@ class MetricsRecorder:
         return {**columns, "obstacle_distance_m": distances.reshape(len(self._samples), num)}
 
     def metrics(self, world: int, clamps: int) -> Metrics:
-        """A world's metrics, as ``results.json`` keeps them; null if there was nothing to measure."""
+        """A world's metrics, as in ``results.json``; None for values that do not exist."""
         facts = self._swarm.facts
         table = self._table(world)
         clearance = min(float(clearance[world].min()) for clearance in self._clearances)
@@ -137,7 +137,7 @@ class MetricsRecorder:
 
 
 def _own(task: Task, world: int) -> dict[str, float | None]:
-    """A task's own metrics. Raises ScenarioError where names are taken, or lack what tables and trainings read."""
+    """A task's own metrics. Raises ScenarioError where a name is taken, or a required name is missing."""
     own, name = task.metrics(world), type(task).__name__
     needed = set[str]() if isinstance(task, Follow) else {"success_share", "swarm_success", task.headline}
     if taken := sorted(own.keys() & MEASURED - needed):
@@ -148,7 +148,7 @@ def _own(task: Task, world: int) -> dict[str, float | None]:
 
 
 def _mean(values: Float64) -> float | None:
-    """Mean over the samples at which there was something to measure."""
+    """Mean over the finite samples."""
     finite = values[np.isfinite(values)]
     return float(finite.mean()) if finite.size else None
 

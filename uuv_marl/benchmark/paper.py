@@ -1,4 +1,4 @@
-"""The paper's own numbers (Wang et al., J. Mar. Sci. Eng. 2024, 12, 489), single runs as far as it says."""
+"""Numbers stated in the paper (Wang et al., J. Mar. Sci. Eng. 2024, 12, 489), presumably of single runs."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Results on disk: every seed and metric, written whole after each run, so that a stopped benchmark can go on."""
+"""Results on disk: every seed and metric, written after each run, so that a stopped benchmark can be resumed."""
 
 import functools
 import hashlib
@@ -22,15 +22,15 @@ from typing_extensions import TypedDict
 from uuv_marl import __version__
 from uuv_marl.atomic import replacing, write_text, writing
 from uuv_marl.baselines.learned.trained import Trained
-from uuv_marl.baselines.making import uses_identity
-from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.making import policy_requirements
 from uuv_marl.baselines.registry import policy_class
-from uuv_marl.baselines.requirements import PolicyRequirements
+from uuv_marl.baselines.requirements import FULL_TORQUE_NM, PolicyRequirements
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.messages import explain
 from uuv_marl.types import Float32
 
 FILE = "results.json"
@@ -45,7 +45,7 @@ _LONGEST_NAME = 200
 
 
 class ResultRow(NamedTuple):
-    """One run as ``results.json`` keeps it."""
+    """One run in ``results.json``."""
 
     scenario: str
     policy: str
@@ -54,22 +54,22 @@ class ResultRow(NamedTuple):
 
 
 class PolicyInfo(TypedDict):
-    """What a policy has beyond the percept; a hash of its file, if it is a user's."""
+    """Requirements of a policy beyond the percept, and a hash of its file, if it is a user's."""
 
     channels: list[str]
     yaw_damping_nms: float
-    """The policy's inner loop on a vehicle of ``Policy.full_torque_nm``; ``inner_loop_nms`` gives that on another."""
+    """The policy's inner loop on a vehicle of ``FULL_TORQUE_NM``; ``inner_loop_nms`` gives that on another."""
     identity: NotRequired[Literal[True]]
-    """Where it acts by a vehicle's index."""
+    """Present where the policy uses a vehicle's index."""
     decision_period_s: NotRequired[float]
-    """Period between decisions, where it needs one."""
+    """Required period between decisions [s], if any."""
     source: str | None
     policy_class: NotRequired[str]
-    """What decides beside a network: ``end to end``, ``end to end + filter``, ``around a law``."""
+    """Class of a network's policy, such as ``end to end`` or ``end to end + filter``."""
 
 
 class Content(TypedDict):
-    """What ``results.json`` holds; docs/benchmark.md defines every key."""
+    """Content of ``results.json``; docs/benchmark.md defines every key."""
 
     __pydantic_config__ = ConfigDict(strict=True, extra="forbid")  # pyright: ignore[reportGeneralTypeIssues]
 
@@ -86,14 +86,13 @@ _CONTENT = TypeAdapter(Content)
 
 
 def read_content(path: Path, remedy: str = "move it away or give another --output") -> Content:
-    """What a ``results.json`` holds. Raises ResultsError with the remedy where it is none of this version's."""
+    """Content of a ``results.json``. Raises ResultsError with the remedy where it is not of this version."""
     try:
         content = _CONTENT.validate_json(path.read_bytes())
     except OSError as error:
         reason = error.strerror or str(error)
     except ValidationError as error:
-        first = error.errors()[0]
-        reason = f"{'.'.join(map(str, first['loc']))}: {first['msg']}".removeprefix(": ")
+        reason = explain(error, None)
     else:
         unknown = {row.scenario for row in content["runs"]} - set(content["scenarios"])
         unknown |= {row.policy for row in content["runs"]} - set(content["policies"])
@@ -109,11 +108,11 @@ class Results:
     Two processes must not write to one folder: hold ``uuv_marl.atomic.locked`` while you write.
 
     Args:
-        folder: made if missing. Results in it are continued if they come from the same code, libraries and
-            scenarios. A policy that they name is not imported or opened before ``use``.
-        scenarios: the scenarios that runs will name.
-        route_seeds: seeds whose routes are kept.
-        traces: whether runs leave their time series, about 100 kB each.
+        folder: created if missing. Results in it are continued if they come from the same code, libraries and
+            scenarios. Their policies are not imported or opened before ``use``.
+        scenarios: the scenarios of the runs.
+        route_seeds: seeds whose trajectories are kept.
+        traces: whether time series are kept, about 100 kB for each run.
 
     Raises:
         ResultsError: the folder can't be written, or holds results that can't be continued.
@@ -131,7 +130,7 @@ class Results:
         self._fingerprint, self._versions = source_fingerprint(), _versions() | _tasks(self.scenarios.values())
         self._runs: dict[tuple[str, str, int], Metrics] = {}
         self._untraced: set[tuple[str, str, int]] = set()
-        """Runs whose time series are gone."""
+        """Runs whose time series are missing."""
         self._path = folder / FILE
         with writing(folder):
             (folder / "traces" if traces else folder).mkdir(parents=True, exist_ok=True)
@@ -147,8 +146,8 @@ class Results:
         for library, this_version in self._versions.items():
             if (saved_version := content["versions"].get(library, this_version)) != this_version:
                 raise ResultsError(
-                    f"{self._path} comes from {library} {saved_version}, and here is {this_version}; {elsewhere}, so that no table "
-                    "mixes the two"
+                    f"{self._path} comes from {library} {saved_version}, and here is {this_version}; {elsewhere}, so "
+                    "that no table mixes the two"
                 )
         for name, dump in self._dumps.items():
             if content["scenarios"].get(name, dump) != dump:
@@ -168,7 +167,7 @@ class Results:
         return [ResultRow(*key, self._runs[key]) for key in sorted(self._runs)]
 
     def use(self, policy: str) -> None:
-        """Record a policy's knowledge and file before its first run. Raises ResultsError if its file has changed."""
+        """Record a policy's requirements and file before its first run. Raises ResultsError if its file has changed."""
         now = policy_info(policy)
         if self.policies.setdefault(policy, now)["source"] != now["source"]:
             raise ResultsError(
@@ -183,12 +182,12 @@ class Results:
             self._runs = {key: metrics for key, metrics in self._runs.items() if key[1] != policy}
 
     def has(self, scenario: str, policy: str, seed: int) -> bool:
-        """Whether this run is done, and its time series are there."""
+        """Whether this run and its time series exist."""
         key = scenario, policy, seed
         return key in self._runs and key not in self._untraced
 
     def add(self, scenario: str, policy: str, run: Run) -> None:
-        """Keep a run, on disk at once. Raises ResultsError if the policy's file has changed: no table mixes two."""
+        """Write a run to disk. Raises ResultsError if the policy's file has changed."""
         self.use(policy)
         if self._traces:
             self._add_trace(self.trace_path(scenario, policy, run.seed), run)
@@ -219,21 +218,21 @@ class Results:
         return [ResultRow(*key, self._runs[key]) for key in keys if key in self._runs]
 
     def trace_path(self, scenario: str, policy: str, seed: int) -> Path:
-        """Where a run's time series are."""
+        """Path of a run's time series."""
         return trace_path(self.folder, scenario, policy, seed)
 
     def trace(self, scenario: str, policy: str, seed: int) -> dict[str, Float32]:
-        """A run's time series, as ``load_trace`` gives them."""
+        """A run's time series, see ``load_trace``."""
         return load_trace(self.trace_path(scenario, policy, seed))
 
 
 def trace_path(folder: Path, scenario: str, policy: str, seed: int) -> Path:
-    """Where the time series of a run are."""
+    """Path of a run's time series."""
     return folder / "traces" / f"{run_name(scenario, policy, seed)}.npz"
 
 
 def run_name(scenario: str, policy: str, seed: int) -> str:
-    """A name of a run for files, without a suffix; a long one ends in a hash."""
+    """File name of a run without a suffix; a long name ends in a hash."""
     name = f"{scenario}.{quote(policy, safe='')}.{seed}"
     if len(name.encode()) > _LONGEST_NAME:
         name = f"{name.encode()[: _LONGEST_NAME - 17].decode(errors='ignore')}-{_hash(name.encode())}"
@@ -243,7 +242,7 @@ def run_name(scenario: str, policy: str, seed: int) -> str:
 def load_trace(path: UserPath) -> dict[str, Float32]:
     """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
 
-    Also ``obstacles`` and ``waypoints``, and for seeds whose routes are kept the fields of ``evaluate.Routes``, as
+    Also ``obstacles`` and ``waypoints``, and where trajectories are kept the fields of ``evaluate.Routes`` as
     ``route_time_s`` and so on; docs/benchmark.md has shapes and units.
 
     Raises:
@@ -254,37 +253,38 @@ def load_trace(path: UserPath) -> dict[str, Float32]:
             return {name: arrays[name] for name in arrays.files}
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise ResultsError(
-            f"{path} can't be read ({error}); delete it, and the benchmark's command makes it again"
+            f"{path} can't be read ({error}); delete it and run the benchmark's command again"
         ) from error
 
 
 def policy_info(policy: str) -> PolicyInfo:
-    """What a policy has beyond the percept, as tables and results show it; a hash of its file, if it is a user's."""
+    """Requirements of a policy as tables and results show them, and a hash of its file, if it is a user's."""
     policy_type = policy_class(policy)
     if isinstance(policy_type, Trained):
         source = policy_type.checkpoint.digest
     else:
         file = inspect.getsourcefile(policy_type)
         source = (_hash(Path(file).read_bytes()) if file else _unknown()) if ":" in policy else None
-    damping = policy_type.yaw_damping_nms * (Policy.full_torque_nm / policy_type.full_torque_nm)
-    known = PolicyInfo(channels=list(policy_type.channels), yaw_damping_nms=damping, source=source)
-    if uses_identity(policy):
+    required = policy_requirements(policy)
+    damping = required.yaw_damping_nms * (FULL_TORQUE_NM / required.full_torque_nm)
+    known = PolicyInfo(channels=list(required.channels), yaw_damping_nms=damping, source=source)
+    if required.identity:
         known["identity"] = True
-    if policy_type.decision_period_s:
-        known["decision_period_s"] = policy_type.decision_period_s
+    if required.decision_period_s:
+        known["decision_period_s"] = required.decision_period_s
     if isinstance(policy_type, Trained):
         known["policy_class"] = policy_type.checkpoint.card.policy_class
     return known
 
 
 def requirements_of(known: PolicyInfo) -> PolicyRequirements:
-    """What a policy declared of which this is known."""
-    every = known.get("decision_period_s")
-    return PolicyRequirements(known["channels"], known["yaw_damping_nms"], Policy.full_torque_nm, every)
+    """The requirements of a policy in ``results.json``."""
+    period = known.get("decision_period_s")
+    return PolicyRequirements(known["channels"], known["yaw_damping_nms"], decision_period_s=period)
 
 
 def source_fingerprint() -> str:
-    """Hash of all that a run's numbers come from: code of the layers up to the benchmark's, and tuned gains."""
+    """Hash of everything that determines a run: code of the layers up to the benchmark's, and tuned gains."""
     code = sorted({path for pattern in _SOURCES for path in _PACKAGE.glob(pattern)})
     if Path(__file__).resolve() not in code:
         return _unknown()
@@ -295,7 +295,7 @@ def source_fingerprint() -> str:
 
 @functools.cache
 def _unknown() -> str:
-    """In place of a hash where no source lies on disk: another one in each process, so that no results are mixed."""
+    """A stand-in for a hash without source on disk, different in each process, so that no results are mixed."""
     return f"unknown {uuid.uuid4().hex[:16]}"
 
 
@@ -304,13 +304,13 @@ def _hash(data: bytes) -> str:
 
 
 def _tasks(scenarios: Iterable[Scenario]) -> dict[str, str]:
-    """A hash of the file of each task that is a user's, by its name."""
+    """Hash of the file of each user-defined task, by its name."""
     named = {scenario.task.name: scenario.task_class for scenario in scenarios if ":" in scenario.task.name}
     files = {name: inspect.getsourcefile(task) for name, task in named.items()}
     return {name: _hash(Path(file).read_bytes()) if file else _unknown() for name, file in files.items()}
 
 
 def _versions() -> dict[str, str]:
-    """Versions of all that runs depend on."""
+    """Versions of the package, Python and the libraries that runs depend on."""
     libraries = {library: version(library) for library in _LIBRARIES}
     return {"uuv_marl": __version__, "python": platform.python_version(), **libraries}

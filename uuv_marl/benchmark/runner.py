@@ -1,11 +1,8 @@
-"""The benchmark as a job: it finds the missing runs, runs them, and writes table and pictures."""
+"""Run what is missing of a benchmark, and write its tables and pictures."""
 
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
-
-from rich.table import Table as RichTable
 
 from uuv_marl.atomic import write_text, writing
 from uuv_marl.baselines import with_policy_requirements
@@ -14,28 +11,16 @@ from uuv_marl.baselines.registry import is_trained
 from uuv_marl.benchmark.evaluate import Progress, Run, blaming, episodes
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import ResultRow, Results
-from uuv_marl.benchmark.tables import (
-    CAPTION,
-    HEADERS,
-    TableRow,
-    counted,
-    markdown_table,
-    rich_table,
-    table_rows,
-    task_caption,
-    task_headers,
-    task_rows,
-    task_table,
-)
-from uuv_marl.scenario import Scenario, conditions, differences, scenario_names
-from uuv_marl.tasks import Follow
+from uuv_marl.benchmark.tables import Table, markdown_table, scenario_table
+from uuv_marl.errors import ScenarioError
+from uuv_marl.scenario import Scenario
 
 DEFAULT_POLICIES = ("bio_inspired", "sff", "sdc", "scout", "mappo", "ppo")
-"""The paper's Table 2, the safest hand-made law, and learned policies; all others by name."""
+"""The policies of the paper's Table 2, the safest controller, and learned policies."""
 
 
 def default_policies(scenarios: Sequence[Scenario]) -> list[str]:
-    """``DEFAULT_POLICIES``; where scenarios fix the clocks for all, the laws among them at their own clocks, too."""
+    """``DEFAULT_POLICIES``; where scenarios fix the clocks, also the controllers with their own clocks."""
     fixed = all(scenario.timing.fixed for scenario in scenarios)
     return [
         *DEFAULT_POLICIES,
@@ -55,15 +40,9 @@ def run_missing(
     report: Report,
     **parameters: object,
 ) -> None:
-    """Run what ``results`` lacks; every finished seed is kept at once.
+    """Run what ``results`` lacks of these scenarios, policies and seeds; each finished seed is saved at once.
 
-    Args:
-        results: the runs are added to them.
-        scenarios: to run on.
-        policies: their names.
-        seeds: of the runs on each scenario with each policy.
-        report: called with scenario, policy and the share of their work that is done.
-        parameters: of the policies.
+    ``parameters`` are keyword arguments of the policies.
     """
     for scenario in scenarios:
         for policy in policies:
@@ -81,17 +60,18 @@ def run_missing(
             report(scenario.name, policy, 1.0)
 
 
+def distinct_names(scenarios: Sequence[Scenario], what: str) -> list[str]:
+    """Names of the scenarios of a table or report. Raises ScenarioError where two are equal."""
+    names = [scenario.name for scenario in scenarios]
+    if len(set(names)) < len(names):
+        raise ScenarioError(f"scenarios of one {what} need different names, got {', '.join(names)}; rename a file")
+    return names
+
+
 def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int]) -> ResultRow:
-    """The worst run: the one with most collisions, then one that did not arrive, then the smallest distance.
+    """The worst run: most collisions, then no arrival, then the smallest distance to a vehicle or an obstacle.
 
-    The distance is between two vehicles or to an obstacle's surface, whichever is smaller. Of equal runs the first
-    counts, in the given order of scenarios, policies and seeds.
-
-    Args:
-        results: with the runs.
-        scenarios: to look at.
-        policies: their names.
-        seeds: to look at.
+    Of equal runs the first counts, in the given order of scenarios, policies and seeds.
     """
 
     def badness(row: ResultRow) -> tuple[int, bool, float]:
@@ -102,59 +82,24 @@ def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[st
     return max((row for s in scenarios for p in policies for row in results.select(s.name, p, seeds)), key=badness)
 
 
-def title(scenario: Scenario, seeds: Sequence[int]) -> str:
-    """Heading of a scenario's table."""
-    changed = differences(scenario) if scenario.name in scenario_names() else []
-    note = f"; CHANGED: {', '.join(changed)}" if changed else ""
-    return (
-        f"{scenario.name} v{scenario.version} ({scenario.source}), {scenario.swarm.num_vehicles} vehicles, "
-        f"{counted(len(seeds), 'seed')}, echoes report the {scenario.sonar.echo_reports}, {conditions(scenario)}{note}"
-    )
-
-
-class Table(NamedTuple):
-    """A scenario's table."""
-
-    title: str
-    rows: Sequence[TableRow] | Sequence[tuple[str, ...]]
-    headers: tuple[str, ...] = HEADERS
-    """Those of ``follow``, whose rows are ``TableRow``, or of another task."""
-    caption: str = CAPTION
-
-
 def write_report(
     results: Results, scenarios: Sequence[Scenario], seeds: Sequence[int]
 ) -> tuple[list[Table], list[Path]]:
-    """``table.md`` and the pictures, of every policy that the results hold runs of on these scenarios and seeds.
+    """Write ``table.md`` and the pictures of every policy with runs on these scenarios and seeds.
 
     Returns:
-        A table for each scenario, its rows the default policies in their order, then others by name; and the paths
-        written, that of the table first.
+        A table for each scenario, with the default policies in their order, then others by name; and the paths
+        written, first the table's.
 
     Raises:
         ResultsError: a file can't be written.
     """
     held = [name for name in sorted(results.policies) if any(results.select(s.name, name, seeds) for s in scenarios)]
     policies = [name for name in dict.fromkeys([*DEFAULT_POLICIES, *held]) if name in held]
-    tables = [_table(results, scenario, policies, seeds) for scenario in scenarios]
+    tables = [scenario_table(results, scenario, policies, seeds) for scenario in scenarios]
     path = results.folder / "table.md"
     texts = [f"## {table.title}\n\n{markdown_table(table.headers, table.rows)}" for table in tables]
     captions = dict.fromkeys(table.caption for table in tables)
     write_text(path, "\n".join([*texts, *(f"{caption}\n" for caption in captions)]))
     with writing(results.folder / "figures"):
         return tables, [path, *(figure for s in scenarios for figure in draw_all(results, s.name, policies, seeds))]
-
-
-def terminal_table(table: Table, width: int) -> RichTable:
-    """A table for a terminal of a given width in columns."""
-    if table.headers == HEADERS:
-        return rich_table(table.title, [TableRow(*row) for row in table.rows], width)
-    return task_table(table.title, table.headers, table.rows, table.caption, width)
-
-
-def _table(results: Results, scenario: Scenario, policies: Sequence[str], seeds: Sequence[int]) -> Table:
-    name, heading = scenario.name, title(scenario, seeds)
-    if issubclass(scenario.task_class, Follow):
-        return Table(heading, table_rows(results, name, policies, seeds))
-    task = scenario.task_class
-    return Table(heading, task_rows(results, name, policies, seeds), task_headers(task), task_caption(task))

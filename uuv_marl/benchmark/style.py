@@ -1,4 +1,4 @@
-"""What all pictures share: the house style, panels with one legend, obstacles and courses, and how they are saved."""
+"""Shared parts of all pictures: style, panels with one legend, obstacles and trajectories, and saving."""
 
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
@@ -22,13 +22,13 @@ with pictures():
     from matplotlib.patches import Circle
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
-"""Okabe and Ito's palette, as ``house.mplstyle`` has it."""
+"""Okabe and Ito's palette, as in ``house.mplstyle``."""
 BLUE, ORANGE, GREEN, PINK, AMBER, SKY, BLACK, GREY = COLOURS
 
 
 @contextmanager
 def house_style() -> Generator[None]:
-    """Pictures drawn inside have the house style (``house.mplstyle``); then Matplotlib's settings are restored."""
+    """Apply ``house.mplstyle`` in the block; Matplotlib's settings are restored afterwards."""
     with matplotlib.style.context(["default", "uuv_marl.benchmark.house"]):
         yield
 
@@ -36,7 +36,7 @@ def house_style() -> Generator[None]:
 def panels(
     num: int, columns: int = 4, size: tuple[float, float] = (5.2, 4.4), **options: Any
 ) -> tuple[Figure, list[Axes]]:
-    """A figure with at least ``num`` panels, by row; those beyond ``num`` are empty."""
+    """A figure with at least ``num`` panels, row by row; further ones are empty."""
     rows = -(-num // columns)
     across = -(-num // rows)
     figure = Figure(figsize=(size[0] * across, size[1] * rows))
@@ -47,7 +47,7 @@ def panels(
 
 
 def legend(figure: Figure, into: Axes | None = None, columns: int = 5) -> Figure:
-    """The figure with one legend for all panels, each label once: below them, or in an empty panel."""
+    """Add one legend for all panels, below them or in an empty panel; return the figure."""
     handles: dict[str, Artist] = {}
     for ax in figure.axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
@@ -60,7 +60,7 @@ def legend(figure: Figure, into: Axes | None = None, columns: int = 5) -> Figure
 
 
 def draw_map(ax: Axes, waypoints: NDArray[Any], obstacles: Any, team: str | None = None) -> None:
-    """Trajectory, its goal (one waypoint: that alone) in a team's colour, and obstacles (across, up, radius) [m]."""
+    """Draw waypoints (point, 2), the last as the goal, and obstacles (across, up, radius) [m]; in a team's colour."""
     name, size = ("trajectory of l(t)", 11) if len(waypoints) > 1 else ("", 5)
     ax.plot(*waypoints.T, "--", color=team or BLACK, linewidth=1.0, zorder=3, label=name)
     ax.plot(
@@ -72,7 +72,7 @@ def draw_map(ax: Axes, waypoints: NDArray[Any], obstacles: Any, team: str | None
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Save a figure as PNG, the same bytes for the same picture."""
+    """Save a figure as PNG, with the same bytes for the same picture."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as partial:
         FigureCanvasAgg(figure).print_png(str(partial), metadata={"Software": None})

@@ -1,11 +1,11 @@
-"""Success of ``follow`` in disturbed water: the share of vehicles that touched nothing and came to the goal.
+"""Success of ``follow`` in disturbed water: the share of collision-free vehicles that reach the goal.
 
-A task's own success is in ``tasks/task.py``.
+Success of other tasks is in ``tasks/task.py``.
 
-The paper's arrival asks a whole swarm to park within metres, which a current or one dead thruster forbids to policies
-that are perfectly safe. Here a vehicle is ``safe`` if it touched no obstacle and no living vehicle in the whole
-episode, and ``done`` if it is within the arrival's spread of l(t)'s end, ``GRACE_S`` after l(t) came to rest there.
-Shares are over healthy vehicles: those that no fault has hit and that were not lost, except by touching something.
+The paper's arrival requires all vehicles to rest within metres of the goal, which a current or one failed thruster
+prevents even for a safe policy. Here a vehicle is ``safe`` if it has no collision in the whole episode, and ``done`` if
+it is within the arrival's spread of l(t)'s end, ``GRACE_S`` after l(t) stops. Shares are over healthy vehicles: those
+without a fault that were not lost, except by a collision.
 """
 
 import numpy as np
@@ -16,16 +16,16 @@ from uuv_marl.tasks.measures import Success
 from uuv_marl.types import Bool
 
 GRACE_S = 60.0
-"""When vehicles are judged, after l(t)'s end [s]. Assumed: the time beyond l(t)'s that ``base.toml`` allows."""
+"""Time from l(t)'s end to the evaluation [s]. Assumed: the extra time of ``base.toml``."""
 CENTRE_M = 20.0
-"""Of the healthy vehicles' centre from l(t)'s end in a swarm's success. Assumed: a law without integral action stands
-off by less in 1 m/s of current."""
+"""Largest distance of the healthy vehicles' centre from l(t)'s end [m]. Assumed: the offset of a controller without
+integral action in a current of 1 m/s is smaller."""
 TOGETHER = 0.95
-"""Share of the healthy that must be done in a swarm's success. Assumed: one straggler of twenty."""
+"""Smallest share of healthy vehicles that are done for swarm success. Assumed: all but one of twenty."""
 
 
 class SuccessRecorder:
-    """Watches a batch of worlds, and judges each world when its episode ends."""
+    """Records a batch of worlds, and evaluates each world at the end of its episode."""
 
     def __init__(self, swarm: Swarm) -> None:
         shape = swarm.num_worlds, swarm.num_vehicles
@@ -35,7 +35,7 @@ class SuccessRecorder:
         self._offset = np.full((*shape, 2), np.inf)
 
     def update(self, active: Bool) -> None:
-        """Look at the swarm after a reset or step of the ``active`` worlds."""
+        """Record the swarm after a reset or step of the ``active`` worlds."""
         swarm, facts = self._swarm, self._swarm.facts
         self._failed |= active[:, None] & facts.lost & (facts.vehicle_collisions == 0)
         now = active & ~self._judged & (facts.time_s >= swarm.duration_s + GRACE_S - 1e-9)
@@ -44,7 +44,7 @@ class SuccessRecorder:
         self._judged |= now
 
     def metrics(self, world: int) -> Success:
-        """A world's shares of healthy vehicles: safe and done, safe, done; and whether the swarm succeeded (1 or 0)."""
+        """Shares of a world's healthy vehicles that are safe and done, safe, and done; and swarm success (1 or 0)."""
         healthy = ~(self._failed | self._swarm.faulty)[world]
         faulty = int((~healthy).sum())
         if not healthy.any() or not (self._judged[world] or not self._swarm.state.alive[world].any()):

@@ -1,4 +1,4 @@
-"""Suites: cases whose missing runs are made and kept in a folder, so that a stopped job goes on."""
+"""Suites: cases whose missing runs are run and kept in a folder, so that a stopped job can be resumed."""
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +16,7 @@ from uuv_marl.types import Float32
 
 Trace = dict[str, Float32]
 Report = Callable[[str, float], None]
-"""Called with what is being done, and the share of the work that is done."""
+"""Called with the current task, and the share of the work that is done."""
 NOTHING: Mapping[str, object] = MappingProxyType({})
 
 
@@ -24,27 +24,27 @@ class Case(NamedTuple):
     """A policy on a scenario over seeds."""
 
     name: str
-    """Names its folder."""
+    """Name of its folder."""
     scenario: str
     policy: str = "bio_inspired"
     overrides: Mapping[str, object] = NOTHING
-    """Fields of the scenario that are changed."""
+    """Changed fields of the scenario."""
     parameters: Mapping[str, object] = NOTHING
     """Parameters of the policy."""
     seeds: Sequence[int] | None = None
     """None for all of the suite's."""
     routes: bool = False
-    """Whether routes of the suite's seeds are kept."""
+    """Whether trajectories of the suite's seeds are kept."""
     shared: bool = False
-    """Whether cases of one name are policies on the same scenario, whose runs lie together."""
+    """Whether cases with this name are policies on one scenario, with runs in one folder."""
 
     def load(self) -> Scenario:
-        """The scenario, before it grants what the policy declares."""
+        """The scenario without the policy's requirements."""
         return load_scenario(self.scenario, overrides=self.overrides)
 
     @property
     def folder(self) -> str:
-        """Its name; unless it is shared, also a mark of the case's changes: a changed case never finds old runs."""
+        """Folder name; unless shared, with a hash of the case, so that a changed case never finds old runs."""
         if self.shared:
             return self.name
         changed = hashlib.sha256(repr((self.load(), self.policy, sorted(self.parameters.items()))).encode())
@@ -58,7 +58,7 @@ class Suite:
     Args:
         folder: one sub-folder for each case, with a benchmark's results.
         seeds: benchmark seeds 0 to ``seeds - 1``, for cases that name none.
-        traces: whether runs leave their time series.
+        traces: whether time series are kept.
     """
 
     def __init__(self, folder: Path, seeds: int = 1, traces: bool = True) -> None:
@@ -69,7 +69,7 @@ class Suite:
     def run(self, cases: Sequence[Case], report: Report, *, restart: bool = False) -> None:
         """Run what is missing of these cases.
 
-        ``report`` is called as it goes on; ``anew`` drops runs of policies whose file has changed since.
+        ``restart`` drops the runs of policies whose file has changed.
 
         Raises:
             ResultsError: the folder holds other results, or those of a policy before its file changed.
@@ -90,12 +90,12 @@ class Suite:
         return self.seeds if case.seeds is None else case.seeds
 
     def metric(self, case: Case, name: str) -> NDArray[np.float64]:
-        """A metric by seed; NaN where there is none."""
+        """A metric by seed, shape (seed,); NaN where it is None."""
         rows = self.results(case).select(case.scenario, case.policy, self.seeds_of(case))
         return np.array([dict[str, Any](row.metrics)[name] for row in rows], np.float64)
 
     def trace(self, case: Case, seed: int) -> Trace:
-        """A run's time series and routes, see ``Results.trace``."""
+        """A run's time series and trajectories, see ``load_trace``."""
         return self.results(case).trace(case.scenario, case.policy, seed)
 
     def traces(self, case: Case) -> list[Trace]:

@@ -1,4 +1,4 @@
-"""Fair tuning: the same optimiser, evaluations, seeds and objective for every hand-made policy with free gains."""
+"""Fair tuning: the same optimiser, evaluations, seeds and objective for every controller with free gains."""
 
 import csv
 import json
@@ -30,22 +30,22 @@ SCENARIO = "single_obstacle"
 WALLS, GAP, FEW, SILENT = "hard_water", "two_swarms", "few_informed", "silent_targets"
 """Tasks that policies are tuned for."""
 MAPS = tuple(range(10_000, 10_024))
-"""Seeds there, each of which draws another map."""
+"""Tuning seeds of the other tasks, each with its own map."""
 FEWER = {GAP: 4, SILENT: 8}
-"""How many of them for tasks with more vehicles or longer episodes."""
+"""Number of these seeds for tasks with more vehicles or longer episodes."""
 _FAILURE_COST_S = 1000.0
 _COLLISION_COST_S = 50.0
 _CLEARANCE_COST_S_PER_M = 20.0
 OBJECTIVES = (
     "mean task time [s] over seeds, plus costs of collisions and of clearance below s_o",
-    "mean time [s] over seeds, plus 1000 s for the share of vehicles that touched or did not come to the goal",
-    "mean over seeds of 1000 s for the share of the last half in which targets are not held",
+    "mean time [s] over seeds, plus 1000 s for the share of vehicles that do not succeed",
+    "mean over seeds of 1000 s times the share of the last half in which targets are not held",
 )
-"""What is minimised, in the paper's task, in those with goals, and in that with targets."""
+"""Objectives of the paper's task, of tasks with goals, and of the task with targets."""
 
 
 class Range(NamedTuple):
-    """Where a parameter may lie. The search starts in the middle, which was found by hand to work at all."""
+    """Range of a parameter. The search starts in the middle, which was found by hand to work."""
 
     low: float
     high: float
@@ -62,7 +62,7 @@ _RANGES = _ranges()
 
 
 class Space(NamedTuple):
-    """What is tuned, and where."""
+    """A search space, and its scenario."""
 
     free: dict[str, Range]
     """Free parameters."""
@@ -70,12 +70,12 @@ class Space(NamedTuple):
     """From their values to the policy's gains."""
     scenario: str = SCENARIO
     barrier: Barrier | None = None
-    """The safety filter, whose numbers may be free, too; None for a policy without."""
+    """Safety filter, whose parameters may be free too; None for a policy without one."""
     chosen: Mapping[str, object] = {}
-    """Keyword arguments of the policy that are not free."""
+    """Fixed keyword arguments of the policy."""
 
     def parameters(self, drawn: dict[str, float]) -> dict[str, object]:
-        """The policy's keyword arguments: gains, safety filter, and what belongs to neither."""
+        """The policy's keyword arguments: gains, safety filter, and others."""
         if self.barrier is None:
             return {"gains": self.gains(**drawn)}
         gains, barrier = with_numbers(drawn, self.gains(), self.barrier)
@@ -105,16 +105,15 @@ SPACES: dict[str, Space] = {
         _RANGES["leader_follower"] | _RANGES["filter"], leader_follower.LeaderFollowerGains, FEW, Barrier()
     ),
 }
-"""Free parameters of every tuned policy, and how they become its gains. ``POLICY.TASK`` are numbers for a task, which
-``tuned_for`` chooses."""
+"""Search spaces of all tuned policies. ``POLICY.TASK`` are gains for a task, which ``tuned_for`` selects."""
 
 
 def tuning_cost(run: Run, scenario: Scenario) -> float:
-    """What tuning minimises for one seed [s]: the task time, or more than the time limit if the swarm fails.
+    """Cost of one seed [s]: the task time, or more than the time limit if the swarm fails.
 
-    A collision costs more than it can save a swarm that arrives; each metre of clearance below s_o is charged too. In a
-    task of its own it is the episode's time, and 1000 s for the share of vehicles that touched something or did not
-    come to the goal; where targets are to be held, 1000 s for the share that is not.
+    A collision costs more than it can save, and each metre of clearance below s_o adds to the cost. In tasks with goals
+    it is the duration of the episode plus 1000 s times the share of vehicles that do not succeed; in the task with
+    targets, 1000 s times the share of targets that are not held.
     """
     metrics = run.metrics
     own = metrics.get("task", {})
@@ -139,16 +138,16 @@ def search(
     objectives: int = 1,
     first: dict[str, Any] | None = None,
 ) -> Sequence[Any]:
-    """Minimise with Optuna. After an interruption the same call continues, with the draws of an uninterrupted one.
+    """Minimise with Optuna; after an interruption the same call continues with the same random numbers.
 
     Args:
         output: folder of the journal ``NAME.journal``, which Optuna unpickles: continue only a journal that you trust.
-        name: of the search.
-        trials: how many must be complete.
-        objective: from a trial to what is minimised.
-        sampler: made anew for every trial, from the number of trials before.
-        report: called with the number of complete trials and the smallest largest objective.
-        objectives: how many ``objective`` gives.
+        name: name of the search.
+        trials: number of complete trials to reach.
+        objective: from a trial to its cost or costs.
+        sampler: from the number of earlier trials to the sampler of the next one.
+        report: called with the number of complete trials and the smallest maximum of their costs.
+        objectives: number of costs.
         first: parameters of the first trial.
 
     Returns:
@@ -181,9 +180,9 @@ def tune(policy: str, output: UserPath, trials: int, report: Callable[[int, floa
     journal beside them, which Optuna unpickles: continue only a journal that you trust.
 
     Args:
-        policy: a name of ``SPACES``, which say the scenario.
+        policy: a name of ``SPACES``.
         output: folder of the files.
-        trials: to reach in all, those before an interruption included.
+        trials: total number to reach.
         report: called with the number of trials done and the best cost [s].
     """
     import optuna  # noqa: PLC0415 - an extra
@@ -211,7 +210,7 @@ def tune(policy: str, output: UserPath, trials: int, report: Callable[[int, floa
         "seeds": list(seeds),
         "optimiser": f"Optuna {optuna.__version__}, CmaEsSampler, seeded by the number of trials before",
         "space": {name: r._asdict() for name, r in space.free.items()},
-        "best": best.params,  # in full, as evaluated: four digits of them can be another swarm, with a collision
+        "best": best.params,  # in full: rounded parameters can give another run, with a collision
         "best_cost_s": round(best.values[0], 3),
     }
     trials_path, path = output / f"{name}.csv", output / f"{name}.json"

@@ -8,17 +8,19 @@ from typing import Annotated
 import typer
 
 from uuv_marl.cli.console import (
+    MANY_POLICIES,
     Restart,
     changes_of,
     console,
     explained,
     extra,
     find_modules,
+    overrides_option,
     path_option,
     progress_line,
     say,
     working,
-)
+)  # fmt: skip
 
 _WORST = "The worst episode (by collisions, arrival, distance) is seed {worst.seed} of {worst.policy}. To watch it:"
 _NEXT = (
@@ -36,26 +38,23 @@ def benchmark(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name, checkpoint (runs/mine/best) or module:Class, whose module is looked for in the current folder "
-            "too, after all installed ones; repeat for several. "
-            "Default: bio_inspired, sff, sdc, scout, mappo and ppo."
+            help=MANY_POLICIES.format(
+                "bio_inspired, sff, sdc, scout, mappo and ppo. Modules may also be in the current folder."
+            )
         ),
     ] = None,
     seeds: Annotated[
         int, typer.Option(min=1, max=10_000, help="Runs seeds 0 to SEEDS - 1. Tuning and training use higher seeds.")
     ] = 20,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `sonar.echo_reports=surface`."),
-    ] = None,
+    overrides: Annotated[list[str] | None, overrides_option("sonar.echo_reports=surface")] = None,
     output: Annotated[Path, path_option("Folder of results, table and pictures.")] = Path("results/benchmark"),
     restart: Restart = False,
 ) -> None:
     """Compare policies on scenarios over seeds.
 
-    It prints a table with the paper's figures beside and writes `results.json` (every seed and metric), `table.md` and
-    `figures/*.png`. Table and pictures show every policy for which results.json holds runs on these scenarios and
-    seeds. Ctrl-C keeps the finished seeds, and the same command continues.
+    It prints a table with the paper's figures and writes `results.json` (every seed and metric), `table.md` and
+    `figures/*.png`. Table and pictures show every policy with runs in results.json on these scenarios and seeds.
+    Ctrl-C keeps the finished seeds, and the same command continues.
 
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
@@ -63,18 +62,17 @@ def benchmark(
         from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
+        from uuv_marl.benchmark.tables import terminal_table
         from uuv_marl.replay.command import command
-        from uuv_marl.scenario import ScenarioError, load_scenario
+        from uuv_marl.scenario import load_scenario
 
         changes, files = changes_of(overrides or []), scenario or ["single_obstacle"]
         find_modules([*files, *(policy or []), *(overrides or [])])
         scenarios = [load_scenario(name, overrides=changes) for name in files]
-        names = [loaded.name for loaded in scenarios]
-        if len(set(names)) < len(names):
-            raise ScenarioError(f"scenarios of one table need different names, got {', '.join(names)}; rename a file")
+        names = runner.distinct_names(scenarios, "table")
         policies = list(dict.fromkeys(policy or runner.default_policies(scenarios)))
         for name, loaded in itertools.product(policies, scenarios):
-            make_policy(name, with_policy_requirements(name, loaded))  # refused now, not after hours of others' runs
+            make_policy(name, with_policy_requirements(name, loaded))  # raises now, not after hours of other runs
         wanted = range(seeds)
         with working(f"The finished runs are in {output}", alone=output) as bar:
             results = Results(output, scenarios)
@@ -86,7 +84,7 @@ def benchmark(
             runner.run_missing(results, scenarios, policies, wanted, report)
             tables, (markdown, *pictures) = runner.write_report(results, scenarios, wanted)
         for table in tables:
-            console.print(runner.terminal_table(table, console.width))
+            console.print(terminal_table(table, console.width))
         say(f"Every seed: {output}/results.json   table: {markdown}   pictures:")
         for path in pictures:
             say(f"  {path}")
@@ -104,7 +102,7 @@ def tune_command(
     trials: Annotated[int, typer.Option(min=1, help="Evaluations per policy.")] = 300,
     output: Annotated[Path, path_option("Folder for the trials.")] = Path("results/tune"),
 ) -> None:
-    """Search the free gains of hand-made policies: same optimiser, evaluations, seeds and objective for each.
+    """Tune the free gains of controllers: same optimiser, evaluations, seeds and objective for each.
 
     This needs the extra "tune" and takes ten to forty minutes per policy. Ctrl-C keeps the finished trials, and the
     same command continues. The shipped results are in uuv_marl/baselines/tuned. The trials' journal may hold pickled

@@ -1,4 +1,4 @@
-"""What all commands share: the consoles, the progress bar, and errors that say what to do."""
+"""Shared parts of all commands: consoles, options, the progress bar, and error messages."""
 
 import errno
 import io
@@ -23,17 +23,24 @@ from uuv_marl.paths import user_path
 
 
 def _width() -> int | None:
-    """Columns: those of the terminal (None), those that fit a notebook, else 100, as docs and logs have."""
+    """Columns of the output: the terminal's (None), 88 in a notebook, else 100, as in docs and logs."""
     if sys.stdout.isatty():
         return None
-    return 88 if "JPY_PARENT_PID" in os.environ else 100  # Jupyter gives it to all that a kernel starts
+    return 88 if "JPY_PARENT_PID" in os.environ else 100
 
 
 console = Console(width=_width())
 errors = Console(stderr=True)
 Restart = Annotated[
-    bool, typer.Option("--restart", help="Drop the runs of policies whose file has changed since, and run these again.")
+    bool, typer.Option("--restart", help="Drop the runs of policies whose file has changed, and run these again.")
 ]
+MANY_POLICIES = "Name, checkpoint (runs/mine/best) or module:Class. Repeat it for several. Default: {}"
+
+
+def overrides_option(example: str) -> Any:
+    """The option ``--set``, with an example."""
+    return typer.Option("--set", metavar="FIELD=VALUE", help=f"Override a field, such as `{example}`.")
+
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
@@ -42,12 +49,12 @@ _MOST_FRAMES = 5
 
 
 def say(words: object) -> None:
-    """Print words with paths and commands in them, which no end of a line and no brackets may change."""
+    """Print a text as it is, without line breaks and markup, so that its paths and commands can be copied."""
     console.print(str(words), markup=False, highlight=False, soft_wrap=True)
 
 
 def print_everywhere() -> None:
-    """Print a question mark for what the terminal's encoding lacks: no finished work fails while it is told of."""
+    """Print a question mark for characters that the terminal's encoding lacks, instead of an error."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
@@ -59,21 +66,20 @@ def path(text: str | Path) -> Path:
 
 
 def path_option(help_text: str) -> Any:
-    """An option that takes a path, with its help."""
+    """An option for a path."""
     return typer.Option(parser=path, help=help_text)
 
 
 def path_argument(help_text: str, **more: Any) -> Any:
-    """An argument that takes a path, with its help, and more of what ``typer.Argument`` takes."""
+    """An argument for a path, with further arguments of ``typer.Argument``."""
     return typer.Argument(parser=path, help=help_text, **more)
 
 
 @contextmanager
 def explained(*ours: str) -> Iterator[None]:
-    """Turn what a user can mend into one message: no traceback but the lines of the user's own code.
+    """Turn an error that the user can correct into one message, with the lines of the user's own code.
 
-    Args:
-        ours: folders, beside the package, whose code is not the user's.
+    ``ours`` are folders, besides the package, whose code is not the user's.
     """
     try:
         yield
@@ -86,9 +92,7 @@ def explained(*ours: str) -> Iterator[None]:
         elif frames:
             message = f"{type(error).__name__}: {error}"
         elif isinstance(error, OSError) and error.errno in _FULL:
-            message = (
-                f"{error.filename or 'a file'} can't be written ({error.strerror}); what was finished before is safe"
-            )
+            message = f"{error.filename or 'a file'} can't be written ({error.strerror}); earlier results are kept"
         else:
             raise
         errors.print(f"[bold red]Error:[/] {escape(message)}", highlight=False, soft_wrap=True)
@@ -99,13 +103,13 @@ def explained(*ours: str) -> Iterator[None]:
 
 
 def _own_frames(error: BaseException | None, ours: tuple[str, ...]) -> list[traceback.FrameSummary]:
-    """The part of an error's traceback that lies in files which belong to neither this package nor a library."""
+    """The part of an error's traceback in files outside this package and the libraries."""
     frames = traceback.extract_tb(error.__traceback__ if error else None)
     return [f for f in frames if Path(f.filename).is_file() and not f.filename.startswith((*_NOT_THE_USERS, *ours))]
 
 
 def progress_bar() -> Progress:
-    """A bar for each task, with the time that is left; nothing where output is no terminal."""
+    """A bar for each task, with the remaining time; nothing where the output is not a terminal."""
     return Progress(
         TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
         console=console, disable=not console.is_terminal,
@@ -113,18 +117,18 @@ def progress_bar() -> Progress:
 
 
 def progress_line(bar: Progress, name: str, total: float = 1.0) -> Callable[..., None]:
-    """A new line of the bar: to be called with how much of ``total`` is done, and with words in place of the name."""
+    """A new line of the bar: a function of the finished part of ``total``, and of a text that replaces the name."""
     task = bar.add_task(name, total=total)
     return lambda done, words=name: bar.update(task, completed=done, description=words)
 
 
 @contextmanager
 def working(message: str, alone: Path | None = None) -> Iterator[Progress]:
-    """The progress bar of a long work. Ctrl-C ends the command and says what is kept: "The trials are in x".
+    """The progress bar of a long task. Ctrl-C ends the command with a message, such as "The trials are in x".
 
     Args:
-        kept: a sentence without its end.
-        alone: the folder that no other command may write to meanwhile.
+        message: a sentence without its full stop.
+        alone: folder to lock against other commands.
     """
     try:
         with nullcontext() if alone is None else locked(alone), progress_bar() as bar:
@@ -135,7 +139,7 @@ def working(message: str, alone: Path | None = None) -> Iterator[Progress]:
 
 
 def overridden(overrides: Sequence[str]) -> dict[str, object]:
-    """The fields that ``--set`` changes. Raises ScenarioError, also where one is given twice."""
+    """The fields that ``--set`` changes. Raises ScenarioError, also for a field given twice."""
     from uuv_marl.scenario import ScenarioError, parse_override
 
     changes: dict[str, object] = {}
@@ -147,7 +151,7 @@ def overridden(overrides: Sequence[str]) -> dict[str, object]:
 
 
 def changes_of(overrides: Sequence[str]) -> dict[str, object]:
-    """The fields that ``--set`` changes in scenarios that policies run on. Raises ScenarioError, PolicyError."""
+    """The fields that ``--set`` changes in a policy's scenario. Raises ScenarioError or PolicyError."""
     changes = overridden(overrides)
     for field in {"sonar.channels", "actuators.yaw_damping_nms"} & set(changes):
         raise PolicyError(f"{field} can't be set here: every policy has its own (uuv-marl list policies); leave it out")
@@ -155,10 +159,6 @@ def changes_of(overrides: Sequence[str]) -> dict[str, object]:
 
 
 def find_modules(names: Sequence[str]) -> None:
-    """Let ``module:Class`` be looked for in the current folder too, where a name or a file may ask for one.
-
-    Args:
-        names: of policies, scenarios and tasks, or whole overrides.
-    """
+    """Add the current folder to the import path if one of these names or overrides may name a ``module:Class``."""
     if any(":" in name or ".toml" in name for name in names):
-        sys.path.append("")  # last, so that no file of this folder takes the place of an installed module
+        sys.path.append("")  # last, so that no file of this folder hides an installed module

@@ -1,4 +1,4 @@
-"""``uuv-marl demo`` shows three policies on one hard map, at once: from a recording."""
+"""``uuv-marl demo``: a recording of three policies on one hard map."""
 
 import sys
 import webbrowser

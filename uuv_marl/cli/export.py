@@ -1,4 +1,4 @@
-"""``uuv-marl export``: a network for other runtimes."""
+"""``uuv-marl export``: a network as an ONNX model."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,8 +10,7 @@ from uuv_marl.cli.console import explained, extra, path_argument, say
 
 def export(
     policy: Annotated[
-        str,
-        typer.Argument(help="Name of a network, or checkpoint of a training without filter and law, file or folder."),
+        str, typer.Argument(help="Name of a network, or checkpoint without filter and base controller, file or folder.")
     ],
     output: Annotated[Path, path_argument("ONNX file.")],
     scenario: Annotated[
@@ -20,7 +19,7 @@ def export(
 ) -> None:
     """Write a network as an ONNX model, from an agent's observation as closeness to its action. Needs the extra "onnx".
 
-    A network with a memory takes its state and gives the next one. Laws, filters and what is around a law are not
+    A network with a memory also has its state as input and output. Controllers, filters and residual policies are not
     exported.
 
     Example: uuv-marl export runs/starter/best policy.onnx
@@ -36,9 +35,7 @@ def export(
 
         kind = policy_class(policy)
         training = kind.checkpoint.card.training if isinstance(kind, Trained) else {}
-        name, own = (
-            scenario or training.get("scenario", "starter"),
-            training.get("overrides", {}) if scenario is None else {},
-        )
+        name = scenario or training.get("scenario", "starter")
+        own = training.get("overrides", {}) if scenario is None else {}
         write_onnx(policy, load_scenario(name, overrides=overrides_for(name, own)), output)
         say(f"Model: {output}")

@@ -1,4 +1,4 @@
-"""``uuv-marl list``: the scenarios, vehicles and policies that there are."""
+"""``uuv-marl list``: all scenarios, vehicles and policies."""
 
 from enum import StrEnum
 from typing import Annotated
@@ -11,7 +11,7 @@ from uuv_marl.cli.console import console, explained
 
 
 class ListKind(StrEnum):
-    """What can be listed."""
+    """Kinds of lists."""
 
     SCENARIOS = "scenarios"
     VEHICLES = "vehicles"
@@ -24,7 +24,7 @@ def show_list(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Print this scenario's or vehicle's file, with the source of every number: lauv, remus100+munk_on.",
+            help="Print the file of this scenario or vehicle, such as lauv or remus100+munk_on, with all sources.",
         ),
     ] = None,
 ) -> None:
@@ -81,14 +81,15 @@ def _vehicles() -> Table:
 
 def _policies() -> Table:
     from uuv_marl.baselines import POLICIES
-    from uuv_marl.baselines.making import uses_identity
+    from uuv_marl.baselines.making import policy_requirements
 
     table = Table("name", "beyond sonar", "yaw damping [N m s]", "decides every [s]", "what")
     for name, policy_type in POLICIES.items():
-        every = f"{policy_type.decision_period_s:g}" if policy_type.decision_period_s else "-"
+        required = policy_requirements(name)
+        every = f"{required.decision_period_s:g}" if required.decision_period_s else "-"
         what = (policy_type.__doc__ or "").strip().partition("\n")[0]  # nothing under python -OO
-        beyond = [*policy_type.channels, *(["identity"] if uses_identity(name) else [])]
-        table.add_row(name, ", ".join(beyond) or "-", f"{policy_type.yaw_damping_nms:g}", every, what)
+        beyond = [*required.channels, *(["identity"] if required.identity else [])]
+        table.add_row(name, ", ".join(beyond) or "-", f"{required.yaw_damping_nms:g}", every, what)
     return table
 
 

@@ -1,4 +1,4 @@
-"""``uuv-marl replay`` shows an episode: as a page for the browser, or as a film."""
+"""``uuv-marl replay``: an episode as a page for the browser, or as a film."""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -11,12 +11,13 @@ from uuv_marl.cli.console import (
     changes_of,
     explained,
     find_modules,
+    overrides_option,
     path_argument,
     path_option,
     progress_bar,
     progress_line,
     say,
-)
+)  # fmt: skip
 from uuv_marl.replay import FILMS, MOST_EPISODES
 
 if TYPE_CHECKING:
@@ -49,20 +50,16 @@ def replay(
         list[int] | None,
         typer.Option(min=0, metavar="VEHICLE", help="Show this vehicle's sonar too. Repeat it for up to eight."),
     ] = None,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="FIELD=VALUE", help="Override a field, such as `swarm.num_vehicles=200`."),
-    ] = None,
+    overrides: Annotated[list[str] | None, overrides_option("swarm.num_vehicles=200")] = None,
     output: Annotated[
         Path | None,
         path_option("A page (.html), a film (.mp4, .gif) or a picture (.png). Default: a page in results/replay."),
     ] = None,
 ) -> None:
-    """Show an episode: as one HTML file that any browser opens without a network, or as a film.
+    """Show an episode: as one HTML file that works offline in any browser, or as a film.
 
-    The page has a time line with marks for collisions and near misses, trails, zoom, and plots that follow the time. A
-    simulated episode is shown at every decision. A benchmark's saved seed 0 is shown every 0.5 s, without forces and
-    sonar.
+    The page has a time line with collisions and near misses, trails, zoom and plots. A simulated episode is shown at
+    every decision, a benchmark's saved seed 0 every 0.5 s, without forces and sonar.
 
     Example: uuv-marl replay --policy bio_inspired --policy sff --seed 3 --inspect 7
 
@@ -99,7 +96,7 @@ def replay(
 
 
 def _writer(output: Path | None, inspect: Sequence[int]) -> Write:
-    """What writes a file with this ending; what can't be written is refused before anything is simulated."""
+    """The function that writes a file with this suffix. Raises ReplayError before anything is simulated."""
     from uuv_marl.errors import ReplayError
 
     suffix = ".html" if output is None else output.suffix.lower()
@@ -123,7 +120,7 @@ def _writer(output: Path | None, inspect: Sequence[int]) -> Write:
 
 
 def _ready(output: Path) -> Path:
-    """The path, in a folder that can be written to, which is made where it is missing. Raises ResultsError."""
+    """The path, in a writable folder that is created if missing. Raises ResultsError."""
     from uuv_marl.atomic import writing
     from uuv_marl.errors import ReplayError
 
@@ -145,7 +142,7 @@ def _default(recordings: "Sequence[Recording]") -> Path:
 def _simulated(
     name: str, policies: Sequence[str], seed: int, inspect: Sequence[int], overrides: Sequence[str], bar: "Progress"
 ) -> "list[Recording]":
-    """An episode of each policy on the same seed; all are refused before the first is simulated."""
+    """An episode of each policy on the same seed; errors of all are raised before the first is simulated."""
     from uuv_marl.baselines import make_policy, with_policy_requirements
     from uuv_marl.replay.record import checked, record
     from uuv_marl.scenario import load_scenario
@@ -164,14 +161,12 @@ def _simulated(
 
 
 def _saved(run: Path, scenario: str | None, policies: Sequence[str], seed: int | None) -> "list[Recording]":
-    """What a benchmark has saved of an episode."""
+    """Recordings from a benchmark's saved traces."""
     from uuv_marl.errors import ReplayError
     from uuv_marl.replay.traces import from_folder, from_trace
 
     if run.suffix != ".npz":
         return [from_folder(run, scenario, policy, seed or 0) for policy in policies or [None]]
     if scenario or policies or seed is not None:
-        raise ReplayError(
-            f"{run} is one episode already; leave out --scenario, --policy and --seed, or give the folder"
-        )
+        raise ReplayError(f"{run} is one episode; leave out --scenario, --policy and --seed, or give the folder")
     return [from_trace(run)]

@@ -1,11 +1,11 @@
-"""``uuv-marl robustness``: what currents, bad sonar, lags and faults cost each policy."""
+"""``uuv-marl robustness``: the effect of currents, sonar errors, lags and faults on each policy."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from uuv_marl.cli.console import Restart, explained, find_modules, path_option, say, working
+from uuv_marl.cli.console import MANY_POLICIES, Restart, explained, find_modules, path_option, say, working
 
 
 def robustness(
@@ -22,8 +22,9 @@ def robustness(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            help="Name, checkpoint or module:Class. Repeat it for several. Default: bio_inspired, bio_inspired_plus "
-            "and mappo; without --quick the strongest of docs/robustness.md."
+            help=MANY_POLICIES.format(
+                "bio_inspired, bio_inspired_plus and mappo; without --quick the strongest of docs/robustness.md."
+            )
         ),
     ] = None,
     scenario: Annotated[
@@ -33,13 +34,13 @@ def robustness(
     restart: Restart = False,
     output: Annotated[Path, path_option("Folder for results, page and pictures.")] = Path("results/robustness"),
 ) -> None:
-    """Measure what each disturbance of the sea costs: currents, bad sonar, drift, lags, faults.
+    """Measure the effect of each disturbance on success: currents, sonar errors, drift, lags, faults.
 
     Each axis is one disturbance in five levels (uuv_marl/benchmark/robustness/axes.toml, with sources). The command
     writes robustness.md (scores by group and axis), a picture of each scenario (in figures) and episodes.csv (a row for
-    each episode), all of what this command names, whatever else the folder holds. Without --quick it runs what
-    docs/robustness.md shows: 30 to 50 minutes of one core for each of its policies with memory. It needs the extra
-    "analysis". Ctrl-C keeps the finished episodes, and the same command continues.
+    each episode) for the given options. Without --quick it runs what docs/robustness.md shows: 30 to 50 minutes of one
+    core for each policy with memory. It needs the extra "analysis". Ctrl-C keeps the finished episodes, and the same
+    command continues.
 
     Example: uuv-marl robustness --axis W1 --axis A1 --policy mappo --seeds 5
     """

@@ -1,4 +1,4 @@
-"""``uuv-marl train``: from a scenario, or a file, and what differs from it to a policy."""
+"""``uuv-marl train``: train a policy on a scenario or from a recipe."""
 
 import re
 import shlex
@@ -21,16 +21,16 @@ from uuv_marl.cli.console import (
     progress_bar,
     progress_line,
     say,
-)
+)  # fmt: skip
 
-_SUMMARY = "swarms whole {whole:.0%}, vehicles {share:.0%}, contacts {contacts:.1f} an episode"
+_SUMMARY = "swarm success {swarm_success:.0%}, vehicles {share:.0%}, collisions {collisions:.1f} per episode"
 
 
 def _whole_number(text: str) -> int:
     """A number such as 3000000 or 3e6."""
     number = re.fullmatch(r"[0-9]{1,15}(\.[0-9]{1,15})?(e[0-9]{1,2})?", str(text)) and Decimal(text)
     if not number or number < 1 or number != int(number):
-        raise typer.BadParameter(f"{text!r} is no whole number from 1 on; give a number such as 3000000 or 3e6")
+        raise typer.BadParameter(f"{text!r} is not a whole number from 1 on; give a number such as 3000000 or 3e6")
     return int(number)
 
 
@@ -59,7 +59,7 @@ def train_command(
         typer.Option(
             parser=_whole_number,
             metavar="NUMBER",
-            help="In its place, agent-steps in all, such as 3e6: decisions times vehicles.",
+            help="Instead of minutes, agent-steps in all, such as 3e6: decisions times vehicles.",
         ),
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of worlds, weights and noise.")] = None,
@@ -69,17 +69,17 @@ def train_command(
     resume: Annotated[
         bool,
         typer.Option(
-            "--resume", help="Go on from the folder's last checkpoint, with more --minutes or --steps or not."
+            "--resume", help="Continue from the folder's last checkpoint, optionally with more --minutes or --steps."
         ),
     ] = False,
 ) -> None:
     """Train one policy for all vehicles with PPO (MAPPO or IPPO), on one core.
 
-    Where the scenario does not fix it, vehicles decide every 0.5 s, with yaw damping. This needs the extra "train". It
-    writes config.json (the training, versions), progress.csv (a row per iteration), curve.png, checkpoints/ and best/:
-    the policy that was best on validation seeds. Compare it with uuv-marl benchmark --policy FOLDER/best. Ctrl-C stops
-    the training after the current iteration, with a checkpoint; with --resume it continues. With --steps a seed fixes a
-    training on one machine, stopped and continued or not.
+    Unless the scenario fixes them, the decision period is 0.5 s, with yaw damping. This needs the extra "train".
+    It writes config.json (the training, versions), progress.csv (a row per iteration), curve.png, checkpoints/ and
+    best/, the policy that was best on validation seeds. Compare it with uuv-marl benchmark --policy FOLDER/best. Ctrl-C
+    stops the training after the current iteration, with a checkpoint; --resume continues it. With --steps a seed
+    determines a training on one machine, stopped and continued or not.
 
     Example: uuv-marl train starter --minutes 1 --output runs/starter
     """
@@ -90,7 +90,7 @@ def train_command(
         from uuv_marl.train.folder import TrainingFolder
         from uuv_marl.train.training import Training, changed_fields, recipe_fields
 
-        find_modules([":" if resume else scenario, *(overrides or [])])  # a folder may name modules, too
+        find_modules([":" if resume else scenario, *(overrides or [])])
         named = {"minutes": minutes, "steps": steps, "seed": seed}
         changes = {name: value for name, value in named.items() if value is not None}
         if resume:
@@ -113,8 +113,8 @@ def train_command(
         say(f"Done: {last}. Policy: {output}/best   curve: {output}/curve.png")
         if (output / "best").is_dir():
             best, worst = run.best_of(output)
-            fields_given = f"{_SUMMARY.format(**best._asdict())}, after {best.seconds / 60.0:.1f} min"
-            say(f"Its validation was the best: {fields_given}. The worst episode of it:")
+            scores = f"{_SUMMARY.format(**best._asdict())}, after {best.seconds / 60.0:.1f} min"
+            say(f"Best validation: {scores}. Its worst episode:")
             say(f"  {worst}")
 
 
@@ -122,19 +122,19 @@ _OPTIONS = {"overrides": "--set", "scenario": "the scenario"}
 
 
 def _alone(context: typer.Context) -> None:
-    """Refuse what the folder says already."""
+    """Refuse options that the folder determines."""
     for name in context.params:
         source = context.get_parameter_source(name)
         on_command_line = source is not None and source.name == "COMMANDLINE"
         if on_command_line and name not in ("resume", "output", "steps", "minutes"):
             raise typer.BadParameter(
-                f"--resume goes on with the training that the folder holds; leave out {_OPTIONS.get(name, f'--{name}')}"
+                f"--resume continues the training in the folder; leave out {_OPTIONS.get(name, f'--{name}')}"
             )
 
 
 def _follow(records: Iterator[Any], training: Any, until: float) -> str:
-    """Show a training in a bar, and a line for each validation; how it stood at last."""
-    last, judged = "nothing was to be done, because the whole budget is spent already", "no validation yet"
+    """Show a training in a bar, with a line for each validation; return its final summary."""
+    last, judged = "the budget was already spent", "no validation yet"
     with progress_bar() as bar:
         report = progress_line(bar, "starting", until)
         for record in records:
@@ -149,7 +149,7 @@ def _follow(records: Iterator[Any], training: Any, until: float) -> str:
 
 @contextmanager
 def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
-    """Gives whether the block is to stop: the first Ctrl-C is only noted, and the second ends the block at once."""
+    """Whether the block should stop, as a function; the first Ctrl-C sets it, and the second ends the block at once."""
     noted: list[int] = []
 
     def note(number: int, frame: Any) -> None:
@@ -170,8 +170,8 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
         if any((output / "checkpoints").glob("[0-9]*[0-9]")):
             rest = f"The last checkpoint is in {output}; {again} continues."
         elif (output / "config.json").exists():
-            rest = f"There is no checkpoint yet: {again} begins again."
+            rest = f"There is no checkpoint yet: {again} starts again."
         else:
-            rest = "Nothing was written yet; the same command begins again."
+            rest = "Nothing was written yet; the same command starts again."
         say(f"Stopped. {rest}")
         raise typer.Exit(130)

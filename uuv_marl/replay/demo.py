@@ -1,4 +1,4 @@
-"""The demo: three policies on one hard map, recorded once, so that it is shown without a simulation."""
+"""The demo: a recording of three policies on one hard map."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ from uuv_marl.replay.page import html_of
 
 SCENARIO, SEED = "hard_water", 10_210
 POLICIES = ("bio_inspired", "tangent_bug", "mappo_hard_water")
-"""The paper's controller, the best hand-made one, and a network."""
+"""The paper's controller, the best controller, and a network."""
 RECORDED = Path(__file__).with_name("demo.json")
 
 

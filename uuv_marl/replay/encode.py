@@ -1,9 +1,9 @@
-"""A recording as JSON that a browser unpacks by itself: small, with stated resolutions. ``decode.js`` reads it.
+"""A recording as compact JSON with stated resolutions, which ``decode.js`` decodes in the browser.
 
-Arrays become whole numbers, these become differences from what their neighbours in time predict, and deflate packs the
-differences, of which most are zero. Motion is smooth, so an array is coded from coarse to fine: every ``stride``-th
-sample by its second differences, then the samples halfway between by how far they are from a cubic through the four
-around them, until all are there. What decides is exact: series and the map keep all bits of their float32.
+Arrays become integers, integers become differences from a prediction, and deflate compresses the differences, of which
+most are zero. Motion is smooth, so an array is encoded from coarse to fine: every ``stride``-th sample by its second
+differences, then repeatedly the samples halfway between by their difference from a cubic through the four around them.
+Series and the map are exact: they keep all bits of their float32.
 """
 
 import base64
@@ -25,20 +25,20 @@ SCHEMA = 1
 
 
 class Coding(NamedTuple):
-    """How an array becomes whole numbers."""
+    """Conversion of an array to integers."""
 
     unit: float
-    """What 1 stands for."""
+    """Value of the integer 1."""
     slack: float = 0.5
-    """Largest error, in units, of what lies between every ``stride``-th sample; there it is half a unit."""
+    """Largest error in units between every ``stride``-th sample, where it is half a unit."""
     stride: int = 16
     """Coarsest step of an array that is smooth in time, a power of two; 1 for one that is not."""
     order: int = 2
-    """How often every ``stride``-th sample is differenced."""
+    """Order of the differences of every ``stride``-th sample."""
 
     @property
     def resolution(self) -> float:
-        """Largest error of a decoded number, but for the last bit of a float32."""
+        """Largest error of a decoded value, except for the last bit of a float32."""
         return self.unit * max(self.slack, 0.5)
 
 
@@ -58,12 +58,12 @@ CODINGS = {
     "drift": Coding(0.01),
     "traffic": Coding(0.03, 2),
 }
-"""In m, rad, m/s and shares of full force. A hull is 2 m wide, and a pixel of a whole map about 1 m; the sonar of
-inspected vehicles is drawn by their own, finer heading."""
+"""Units are m, rad, m/s and shares of full force. A hull is 2 m wide, and a pixel of a map about 1 m; the sonar of
+inspected vehicles uses a finer heading."""
 
 
 def payload(recordings: Sequence[Recording]) -> dict[str, Any]:
-    """All that a page shows of these episodes, as plain values; ``decode.js`` gives their ``arrays`` as numbers."""
+    """Episodes as plain values for a page; ``decode.js`` decodes their ``arrays``."""
     return {"schema": SCHEMA, "uuv_marl": __version__, "episodes": [_episode(recording) for recording in recordings]}
 
 
@@ -98,7 +98,7 @@ def _episode(recording: Recording) -> dict[str, Any]:
 
 
 def _current(scenario: Scenario) -> dict[str, float]:
-    """What the page needs beside the arrays ``drift`` and ``eddies`` to draw the current."""
+    """Numbers to draw the current, besides the arrays ``drift`` and ``eddies``."""
     return {"core_m": scenario.current.eddy_core_m, "shown_mps": shown_speed(scenario)}
 
 
@@ -149,14 +149,14 @@ def _arrays(recording: Recording) -> dict[str, Any]:
 
 
 def unwrapped(heading: Float32) -> Float32:
-    """Headings that don't jump by a turn from sample to sample, so that one can interpolate, shape (time, vehicle)."""
+    """Headings without jumps by a full turn, for interpolation, shape (time, vehicle)."""
     step = np.diff(heading, axis=0, prepend=heading[:1])
     turns = np.cumsum(np.nan_to_num(np.rint(step / _TURN)), axis=0)
     return (heading - _TURN * turns).astype(np.float32)
 
 
 def _coded(values: Float32, coding: Coding) -> dict[str, Any]:
-    """An array of numbers in units, NaN where one is missing."""
+    """An array in units of a coding, NaN for missing values."""
     missing = np.isnan(values)
     scaled = _filled(values.astype(np.float64), missing) / coding.unit
     whole = np.rint(scaled).astype(np.int32)
@@ -166,12 +166,12 @@ def _coded(values: Float32, coding: Coding) -> dict[str, Any]:
 
 
 def _bits(values: Float32) -> dict[str, Any]:
-    """An array of which every bit is kept."""
+    """An array with all its bits."""
     return _entry(values, _differences(values.view(np.int32), 2))
 
 
 def _whole(values: Int32, order: int) -> dict[str, Any]:
-    """An array of whole numbers."""
+    """An array of integers."""
     return _entry(values, _differences(values, order), order=order)
 
 
@@ -179,7 +179,7 @@ def _entry(
     values: NDArray[Any], data: Int32, scale: float | None = None, stride: int = 1, order: int = 2,
     missing: str | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """An array as ``decode.js`` reads it: ``data`` are its whole numbers, differenced, in units of ``scale``."""
+    """An array for ``decode.js``: ``data`` are differences of integers in units of ``scale``."""
     return {
         "shape": list(values.shape), "dtype": str(values.dtype), "scale": scale, "stride": stride, "order": order,
         "missing": missing, "data": pack(data),
@@ -187,7 +187,7 @@ def _entry(
 
 
 def _filled(values: Float64, missing: Bool) -> Float64:
-    """The value before in place of each one that is missing, zero where there is none."""
+    """The values, with the previous value in place of each missing one, or zero without one."""
     if not missing.any():
         return values
     time = np.arange(len(values)).reshape(-1, *[1] * (values.ndim - 1))
@@ -196,14 +196,14 @@ def _filled(values: Float64, missing: Bool) -> Float64:
 
 
 def _differences(values: Int32, order: int) -> Int32:
-    """Differences in time of this order, modulo 2^32, in the order of the vehicles, then of time. Shape (value,)."""
+    """Differences in time of this order, modulo 2^32, sorted by vehicle, then by time; shape (value,)."""
     for _ in range(order):
         values = np.diff(values, axis=0, prepend=np.zeros_like(values[:1]))
     return np.moveaxis(values, 0, -1).ravel()
 
 
 def _smooth(scaled: Float64, coding: Coding) -> Int32:
-    """Samples from coarse to fine; each level's differences stand in the order of the vehicles, then of time."""
+    """Differences from coarse to fine, each level sorted by vehicle, then by time."""
     whole = np.zeros(scaled.shape, np.int32)
     whole[:: coding.stride] = np.rint(scaled[:: coding.stride])
     levels = [_differences(whole[:: coding.stride], coding.order)]
@@ -218,7 +218,7 @@ def _smooth(scaled: Float64, coding: Coding) -> Int32:
 
 
 def _between(whole: Int32, now: Int64, half: int) -> Int32:
-    """What samples ``half`` before and after ``now``, and three times as far, say of it; shape as ``whole[now]``."""
+    """Prediction of samples ``now`` from those ``half`` and three times as far before and after; as ``whole[now]``."""
     after = np.where(now + half < len(whole), now + half, now - half)
     guess = (whole[now - half] + whole[after]) >> 1
     inner = (now >= 3 * half) & (now + 3 * half < len(whole))
@@ -229,10 +229,9 @@ def _between(whole: Int32, now: Int64, half: int) -> Int32:
 
 
 def pack(values: Int32) -> str:
-    """Whole numbers as text: deflated, in base64.
+    """Integers as text: compressed, in base64.
 
-    Small numbers of either sign become small unsigned ones. Their lowest bytes come first, then the next ones, as many
-    as any number needs.
+    Small numbers of either sign become small unsigned ones, stored as planes of bytes, the lowest bytes first.
     """
     unsigned = ((values << 1) ^ (values >> 31)).view(np.uint32)
     planes = max(1, math.ceil(int(unsigned.max(initial=0)).bit_length() / 8))

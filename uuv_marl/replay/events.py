@@ -1,4 +1,4 @@
-"""What is marked on a replay's time line: contacts, near misses, losses and the arrival."""
+"""Events on a replay's time line: collisions, near misses, losses and the arrival."""
 
 import numpy as np
 
@@ -6,12 +6,11 @@ from uuv_marl.replay.recording import Event
 from uuv_marl.types import Bool, Float32, Int32
 
 REARM_S = 2.0
-"""A vehicle's next near miss counts once it has kept its distance for so long, so that one which stays at the limit
-makes one mark, not a hundred."""
+"""Time for which a vehicle must keep its distance before its next near miss counts [s]."""
 
 
 def near_misses(kind: str, time_s: Float32, below: Bool) -> list[Event]:
-    """An event for each sample at which near misses begin, with all vehicles whose miss begins there.
+    """An event for each sample at which near misses begin, with these vehicles.
 
     ``below`` says whether a vehicle is below its limit, shape (time, vehicle).
     """
@@ -25,18 +24,20 @@ def near_misses(kind: str, time_s: Float32, below: Bool) -> list[Event]:
     return events
 
 
-def contacts(time_s: Float32, began: Int32, clearance: Float32, position: Float32, hull_radius_m: float) -> list[Event]:
-    """An event for each contact that the engine counted.
+def collisions(
+    time_s: Float32, began: Int32, clearance: Float32, position: Float32, hull_radius_m: float
+) -> list[Event]:
+    """An event for each collision that the simulator counted.
 
-    The engine counts contacts for each vehicle, not with whom: a vehicle whose hull begins to overlap an obstacle has
-    hit that, and the others have hit each other.
+    The simulator counts collisions for each vehicle without the other party: a vehicle whose hull starts to overlap an
+    obstacle has collided with that, and the others with each other.
 
     Args:
         time_s: shape (time,).
-        began: contacts that began since the sample before, shape (time, vehicle).
-        clearance: smallest distance to an obstacle's surface since the sample before [m], shape (time, vehicle).
-        position: also of those who are lost by the contact [m], shape (time, vehicle, 2).
-        hull_radius_m: an obstacle's surface nearer than this is a contact, and a vehicle nearer than twice this.
+        began: collisions since the previous sample, shape (time, vehicle).
+        clearance: smallest distance to an obstacle's surface since the previous sample [m], shape (time, vehicle).
+        position: position, also of vehicles lost in the collision [m], shape (time, vehicle, 2).
+        hull_radius_m: distance to an obstacle's surface below which they collide; twice this for two vehicles.
     """
     events: list[Event] = []
     inside = clearance < hull_radius_m
@@ -57,22 +58,22 @@ def contacts(time_s: Float32, began: Int32, clearance: Float32, position: Float3
     return events
 
 
-def _partner(i: int, left: Int32, position: Float32, touch_m: float) -> int | None:
-    """Whom a vehicle hit between two samples: the nearest of those with contacts left, first of those apart before.
+def _partner(i: int, left: Int32, position: Float32, collision_m: float) -> int | None:
+    """The vehicle that collided with ``i``: the nearest with a collision left, first of those apart before.
 
-    ``left``: contacts of each without an event yet, shape (vehicle,); ``position`` (2, vehicle, 2) [m].
+    ``left`` is the number of collisions without an event, shape (vehicle,); ``position`` (2, vehicle, 2) [m].
     """
     before, now = np.hypot(*np.moveaxis(position - position[:, i : i + 1], -1, 0))
     others = np.flatnonzero((left > 0) & (np.arange(len(left)) != i)).tolist()
-    return min(others, key=lambda j: (before[j] < touch_m, now[j]), default=None)
+    return min(others, key=lambda j: (before[j] < collision_m, now[j]), default=None)
 
 
 def losses(time_s: Float32, alive: Bool) -> list[Event]:
-    """An event for each vehicle at the first sample without it; ``alive`` has shape (time, vehicle)."""
+    """An event for each vehicle at its first sample with ``alive`` (time, vehicle) False."""
     gone, vehicles = np.nonzero(alive[:-1] & ~alive[1:])
     return [Event(float(time_s[t + 1]), "lost", (i,)) for t, i in zip(gone.tolist(), vehicles.tolist(), strict=True)]
 
 
 def arrival(task_time_s: float | None) -> list[Event]:
-    """The swarm's arrival, if it did arrive."""
+    """The event of the swarm's arrival, if it arrives."""
     return [] if task_time_s is None else [Event(task_time_s, "arrived", ())]

@@ -1,4 +1,4 @@
-"""Films and stills of recorded episodes, drawn as the environments draw: MP4, GIF and PNG, without a display."""
+"""Films and stills of recorded episodes by the environments' renderer: MP4, GIF and PNG, without a display."""
 
 import importlib
 from collections.abc import Callable, Iterator, Sequence
@@ -22,22 +22,22 @@ from uuv_marl.replay.scenes import Scenes
 
 Picture = NDArray[np.uint8]
 _LENGTH_S, _HOLD_S = {".mp4": 20.0, ".gif": 10.0}, 2.0
-"""How long a film lasts where no speed is given, and how long it stays at its last picture [s]."""
+"""Duration of a film without a given speed, and of its last picture [s]."""
 _FPS = {".mp4": 20, ".gif": 8}
 _MOMENTS = 4
-"""How many moments a still shows side by side."""
+"""Number of moments that a still shows side by side."""
 
 
 class Format(NamedTuple):
-    """How a film is cut."""
+    """Size and timing of a film."""
 
     size: tuple[int, int]
     """Width and height [px]."""
     fps: int
     plain: bool
-    """Without trails and grid."""
+    """Whether trails and grid are left out."""
     speed: float
-    """Seconds of the episode in a second of the film."""
+    """Seconds of the episode in each second of the film."""
 
 
 def write_film(
@@ -45,21 +45,21 @@ def write_film(
     camera: str = "follow", sonar_of: int | None = None, speed: float | None = None,
     size: tuple[int, int] | None = None, progress: Callable[[float], object] | None = None,
 ) -> None:  # fmt: skip
-    """Write a film of episodes side by side, on one clock; or as PNG a still with moments of them.
+    """Write a film of episodes side by side with a common clock; or, as PNG, a still with several moments.
 
-    A GIF has neither trails nor a grid, which would double its size.
+    A GIF has no trails and no grid, which would double its size.
 
     Args:
         recordings: one to four.
-        path: ends in ``.mp4``, ``.gif`` or ``.png``. It is written whole or not at all.
+        path: a file ``.mp4``, ``.gif`` or ``.png``, which is written atomically.
         camera: ``follow`` or ``map``.
         sonar_of: index of a vehicle whose sonar is shown; the recordings must hold its inspection.
-        speed: seconds of the episode in a second of the film; None for a film of 20 s, or a GIF of 10 s.
-        size: width and height [px]; None for what suits the format.
-        progress: is called with the share that is done, 0 to 1.
+        speed: seconds of the episode in each second of the film; None for a film of 20 s, or a GIF of 10 s.
+        size: width and height [px]; by default according to the format.
+        progress: called with the finished share, 0 to 1.
 
     Raises:
-        ReplayError: an argument can't be used.
+        ReplayError: an argument is invalid.
         ResultsError: the file can't be written.
         MissingExtraError: the extra ``render`` is not installed.
     """
@@ -92,7 +92,7 @@ def write_film(
 
 
 def check_format(path: Path) -> str:
-    """The format that a path's suffix names. Raises ReplayError or MissingExtraError where it can't be written."""
+    """The suffix of a path. Raises ReplayError or MissingExtraError where this format can't be written."""
     suffix = path.suffix.lower()
     if suffix not in FILMS:
         raise ReplayError(f"{path} must end in {', '.join(FILMS[:-1])} or {FILMS[-1]}")
@@ -102,7 +102,7 @@ def check_format(path: Path) -> str:
 
 
 def _size(suffix: str, num: int) -> tuple[int, int]:
-    """Size of the whole picture; a GIF fits a page of GitHub."""
+    """Size of the whole picture [px]; a GIF fits a page of GitHub."""
     if suffix == ".png":
         return 1320, 450 * num
     across = ((560, 414, 276, 206) if suffix == ".gif" else (800, 640, 480, 400))[num - 1]
@@ -110,7 +110,7 @@ def _size(suffix: str, num: int) -> tuple[int, int]:
 
 
 def _names(scenes: Sequence[Scenes]) -> tuple[str, list[str]]:
-    """What all recordings have in common, and what tells them apart."""
+    """Common part of the recordings' titles, and the differing part of each."""
     rows = [
         (str(one.policy), f"{one.scenario.name}, {one.scenario.swarm.num_vehicles} vehicles", f"seed {one.seed}")
         for one in (scene.recording for scene in scenes)
@@ -124,7 +124,7 @@ def _names(scenes: Sequence[Scenes]) -> tuple[str, list[str]]:
 def _pictures(
     scenes: Sequence[Scenes], form: Format, camera: str, longest: float, progress: Callable[[float], object]
 ) -> Iterator[Picture]:
-    """The film's pictures, one after the other."""
+    """The pictures of a film."""
     frame, (common, names) = Frame(form.size, len(scenes), grid=not form.plain), _names(scenes)
     heading = f"{common}, {form.speed:.3g} times as fast" if form.speed != 1.0 else common
     num = int(np.ceil(longest / form.speed * form.fps)) + 1
@@ -136,7 +136,7 @@ def _pictures(
 
 
 def _still(scenes: Sequence[Scenes], form: Format, camera: str, longest: float) -> Picture:
-    """A row for each recording, from its start to the last one's end."""
+    """A row of moments for each recording, up to the end of the longest one."""
     common, names = _names(scenes)
     moments = np.linspace(0.0, longest, _MOMENTS).tolist()
     panels = [
@@ -148,7 +148,7 @@ def _still(scenes: Sequence[Scenes], form: Format, camera: str, longest: float) 
 
 
 def _write_gif(path: Path, pictures: Iterator[Picture], form: Format) -> None:
-    """Write a GIF in few colours, the same for all frames, so that what stands still takes no room."""
+    """Write a GIF with one palette of few colours for all frames, which compresses static parts."""
     palette = Image.new("P", (1, 1))
     palette.putpalette([part for colour in ink.palette() for part in colour])
     frames = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
@@ -157,7 +157,7 @@ def _write_gif(path: Path, pictures: Iterator[Picture], form: Format) -> None:
 
 
 def _write_mp4(path: Path, pictures: Iterator[Picture], form: Format) -> None:
-    """H.264, as every browser and slide program plays it."""
+    """Write an MP4 in H.264, which all browsers play."""
     av = _av()
     with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
         stream = container.add_stream("libx264", rate=form.fps, options={"crf": "23", "preset": "veryfast"})
@@ -171,6 +171,6 @@ def _write_mp4(path: Path, pictures: Iterator[Picture], form: Format) -> None:
 
 
 def _av() -> Any:
-    """PyAV, the encoder."""
+    """Import PyAV, the encoder."""
     with extra("render", "an .mp4"):
         return importlib.import_module("av")

@@ -1,7 +1,6 @@
-"""The replay as a page: one HTML file that needs nothing beside it, neither network nor server.
+"""The replay as one HTML file that needs no network and no server.
 
-The assets lie in ``page/``. Its scripts are ES modules that import each other, so that Node and editors read them as
-they are; inlined, they are one module, without their imports and exports.
+Its assets are in ``page/``. The scripts are ES modules, which are inlined as one module without imports and exports.
 """
 
 import base64
@@ -26,7 +25,7 @@ _MODULE_WORDS = re.compile(r"^(?:import [^;]*;\n|export )", re.MULTILINE)
 
 
 def page_html(recordings: Sequence[Recording]) -> str:
-    """One to four episodes side by side, as a page that requests nothing.
+    """One to four episodes side by side, as a self-contained page.
 
     Raises:
         ReplayError: there are none, or more than four.
@@ -35,7 +34,7 @@ def page_html(recordings: Sequence[Recording]) -> str:
 
 
 def html_of(data: Mapping[str, Any]) -> str:
-    """The page of episodes that are coded as a ``payload``."""
+    """The page of episodes that are encoded as a ``payload``."""
     parts = {
         "title": html.escape(_title(data)),
         "style": f"{_asset('uPlot.min.css')}\n{_asset('page.css')}",
@@ -48,16 +47,16 @@ def html_of(data: Mapping[str, Any]) -> str:
 
 
 def write_page(recordings: Sequence[Recording], path: UserPath) -> None:
-    """Write ``page_html`` to a file, whole or not at all. Raises ResultsError where it can't be written."""
+    """Write ``page_html`` to a file atomically. Raises ResultsError where it can't be written."""
     write_text(user_path(path), page_html(recordings))
 
 
 class Replay:
-    """Episodes that a notebook shows where this object is a cell's value: the page, in a frame of its own.
+    """Episodes that a notebook shows as a page in a frame, as the value of a cell.
 
     Args:
         recordings: one to four.
-        height_px: of the frame.
+        height_px: height of the frame.
     """
 
     def __init__(self, recordings: Sequence[Recording], height_px: int = 640) -> None:
@@ -91,13 +90,13 @@ def _asset(name: str) -> str:
 
 
 def _deflated(text: str) -> str:
-    """As ``inflate`` of ``decode.js`` reads it."""
+    """Compressed text for ``inflate`` of ``decode.js``."""
     deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     return base64.b64encode(deflate.compress(text.encode()) + deflate.flush()).decode("ascii")
 
 
 def _scripts() -> str:
-    """The page's own modules as one; ``app.js`` comes last, for it runs what the others define."""
+    """The page's own modules as one, last ``app.js``, which uses the others."""
     own = [path for path in sorted(_ASSETS.glob("*.js")) if not path.name.startswith(("app", "uPlot"))]
     modules = [_DECODER, *own, _ASSETS / "app.js"]
     return "\n".join(_MODULE_WORDS.sub("", path.read_text(encoding="utf-8")) for path in modules)

@@ -1,4 +1,4 @@
-"""Recording an episode while it is simulated, by the loop and with the numbers of the benchmark."""
+"""Recording an episode while the benchmark's evaluation simulates it."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import Run, blaming, episodes
 from uuv_marl.errors import ReplayError
-from uuv_marl.replay.events import arrival, contacts, losses, near_misses
+from uuv_marl.replay.events import arrival, collisions, losses, near_misses
 from uuv_marl.replay.recording import Event, Inspection, Recording, Water
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
@@ -17,7 +17,7 @@ from uuv_marl.tasks.groups import Groups, groups_of
 from uuv_marl.types import Float32
 
 MOST_INSPECTED = 8
-"""Vehicles whose sonar one recording holds."""
+"""Most vehicles with recorded sonar."""
 
 
 def record(
@@ -27,19 +27,19 @@ def record(
     inspect: Iterable[int] = (),
     report: Callable[[float], None] | None = None,
 ) -> Recording:
-    """Run an episode as the benchmark does, and keep where everybody was at every decision.
+    """Run an episode as the benchmark does, and record all vehicles at every decision.
 
     Args:
-        scenario: what to simulate; the policy is granted what it declares.
+        scenario: scenario without the policy's requirements.
         policy: its name, checkpoint, or ``module:Class``.
-        seed: of the episode.
-        inspect: indices of up to ``MOST_INSPECTED`` vehicles whose sonar and actions are kept.
-        report: called with the share of the longest possible episode that is done.
+        seed: seed of the episode.
+        inspect: indices of up to ``MOST_INSPECTED`` vehicles whose sonar and actions are recorded.
+        report: called with the finished share of the longest possible episode.
 
     Raises:
-        ReplayError: a vehicle to inspect is not there, or there are too many.
-        PolicyError: the policy is unknown, or can't drive this scenario.
-        DivergenceError: the integration step could not follow a vehicle.
+        ReplayError: a vehicle to inspect does not exist, or there are too many.
+        PolicyError: the policy is unknown, or can't run on this scenario.
+        DivergenceError: the integration diverged.
     """
     watched = checked(inspect, scenario)
     scenario = with_policy_requirements(policy, scenario)
@@ -54,7 +54,7 @@ def record(
 
 
 def checked(inspect: Iterable[int], scenario: Scenario) -> list[int]:
-    """The vehicles to inspect, each once. Raises ReplayError where they are too many, or not in the scenario."""
+    """The distinct vehicles to inspect. Raises ReplayError for too many or unknown ones."""
     chosen, n = list(dict.fromkeys(inspect)), scenario.swarm.num_vehicles
     for i in chosen:
         if not 0 <= i < n:
@@ -67,7 +67,7 @@ def checked(inspect: Iterable[int], scenario: Scenario) -> list[int]:
 
 
 class _Tape:
-    """Copies of what a swarm of one world shows after its reset and after every step."""
+    """Copies of the state of a swarm of one world after its reset and after every step."""
 
     def __init__(self, inspect: Sequence[int]) -> None:
         self._inspect = inspect
@@ -77,7 +77,7 @@ class _Tape:
         self._groups: Groups
 
     def __call__(self, swarm: Swarm, action: Float32 | None) -> None:
-        """Keep the state of world 0, as ``evaluate``'s watch."""
+        """Record world 0; a ``watch`` of the evaluation."""
         eta, velocity, facts = swarm.state.eta[0], swarm.velocity[0], swarm.facts
         seen = list(self._inspect)
         percept = swarm.percept
@@ -96,7 +96,7 @@ class _Tape:
         self._add("spacing", facts.spacing[0])
         self._add("clearance", facts.clearance[0])
         self._add("alive", swarm.state.alive[0], np.bool_)
-        self._add("contacts", facts.vehicle_collisions[0], np.int32)
+        self._add("vehicle_collisions", facts.vehicle_collisions[0], np.int32)
         self._add("collisions", facts.collisions[0], np.int32)
         self._add("detected_index", swarm.detected_index[0, seen], np.int32)
         for name in ("neighbour", "echo", "echo_range", "echo_position"):
@@ -109,7 +109,7 @@ class _Tape:
         self._samples.setdefault(name, []).append(copy)
 
     def recording(self, scenario: Scenario, policy: str, run: Run) -> Recording:
-        """The recording of the run that was watched."""
+        """The recording of the run."""
         marks = self._samples.pop("marks")
         most = max(map(len, marks))
         tape = {name: np.array(values) for name, values in self._samples.items()}
@@ -157,10 +157,12 @@ class _Tape:
 
 
 def _events(scenario: Scenario, tape: dict[str, NDArray[Any]], run: Run) -> list[Event]:
-    """All events in the order of time."""
+    """All events, sorted by time."""
     time, limits = tape["time_s"], scenario.constraints
     events = [
-        *contacts(time, tape["contacts"], tape["clearance"], tape["position"], scenario.collision.hull_radius_m),
+        *collisions(
+            time, tape["vehicle_collisions"], tape["clearance"], tape["position"], scenario.collision.hull_radius_m
+        ),
         *near_misses("near", time, tape["spacing"] < limits.s_u_m),
         *near_misses("near_obstacle", time, tape["clearance"] < limits.s_o_m),
         *losses(time, tape["alive"]),
@@ -170,10 +172,10 @@ def _events(scenario: Scenario, tape: dict[str, NDArray[Any]], run: Run) -> list
 
 
 def _where(valid: NDArray[Any], values: NDArray[Any]) -> Float32:
-    """The values, NaN where they are not ``there``, whose axes are the first ones of the values."""
+    """The values, NaN where ``valid`` is False; its axes are the first axes of the values."""
     return np.where(valid.reshape(valid.shape + (1,) * (values.ndim - valid.ndim)), values, np.float32(np.nan))
 
 
 def finite(values: Float32) -> Float32:
-    """The values, NaN where they are infinite because there is nothing to measure."""
+    """The values, NaN where they are infinite."""
     return np.where(np.isfinite(values), values, np.float32(np.nan))

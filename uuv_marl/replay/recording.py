@@ -1,4 +1,4 @@
-"""A recording: one episode as it is replayed in a browser and filmed."""
+"""The recording of an episode."""
 
 from typing import NamedTuple
 
@@ -11,24 +11,24 @@ from uuv_marl.types import Float32, Float64, Int32
 
 
 class Event(NamedTuple):
-    """Something that happened at a sample; ``uuv_marl.replay.events`` says when."""
+    """An event of an episode, see ``uuv_marl.replay.events``."""
 
     time_s: float
     kind: str
-    """``collision`` of two vehicles, ``obstacle`` for a vehicle that hit one, ``near`` and ``near_obstacle`` where
-    spacing fell below s_u or clearance below s_o, ``lost``, or ``arrived`` for the whole swarm."""
+    """``collision`` of two vehicles, ``obstacle`` for one with an obstacle, ``near`` and ``near_obstacle`` where spacing
+    falls below s_u or clearance below s_o, ``lost``, or ``arrived`` for the swarm."""
     vehicles: tuple[int, ...]
-    """Whom it concerns; empty for the whole swarm, and where a saved trace does not say."""
+    """Indices of the vehicles; empty for the swarm, and where a saved trace does not name them."""
 
 
 class Inspection(NamedTuple):
-    """What one vehicle's sonar told it, and what it did.
+    """Detections and actions of one vehicle.
 
     Positions are in its body frame, x forward and y starboard [m].
     """
 
     detected_index: Int32
-    """Index of the vehicle heard in each sub-sector, -1 for none, shape (time, sector)."""
+    """Index of the vehicle detected in each sub-sector, -1 for none, shape (time, sector)."""
     neighbour: Float32
     """Position of that vehicle, NaN for none, shape (time, sector, 2)."""
     echo_range: Float32
@@ -36,21 +36,21 @@ class Inspection(NamedTuple):
     echo_position: Float32
     """Position that the echo reports, NaN for none, shape (time, active, 2)."""
     action: Float32
-    """Shares of full surge force and yaw torque that the policy asked for until the next sample, shape (time, 2); NaN
-    at the end and once the vehicle is lost."""
+    """The policy's action until the next sample, as shares of full surge force and yaw torque, shape (time, 2); NaN at
+    the end and once the vehicle is lost."""
 
 
 class Water(NamedTuple):
-    """How the water moved: everywhere by its drift, and around eddies that stand still."""
+    """Motion of the water: a uniform drift, and stationary eddies."""
 
     drift: Float32
-    """Velocity of mean and process together, north and east [m/s], shape (time, 2)."""
+    """Velocity of the mean current and the random process together, north and east [m/s], shape (time, 2)."""
     eddies: Float64
     """Centre north, east [m] and circulation [m2/s], clockwise positive, shape (eddy, 3)."""
 
 
 class Recording(NamedTuple):
-    """One episode: what was simulated, and where everybody was at each sample.
+    """One episode: the scenario, and all vehicles at each sample.
 
     There is a sample at the start and one for each decision; a saved trace has one every 0.5 s. Frame north, east [m];
     NaN once a vehicle is lost. Arrays that a saved trace does not hold are None.
@@ -63,13 +63,13 @@ class Recording(NamedTuple):
     waypoints: Float32
     """Corners of the first group's trajectory, shape (point, 2)."""
     groups: Groups
-    """Who goes where, and who knows of it."""
+    """Groups of vehicles with their paths, and informed vehicles."""
     obstacles: Float32
     """Centre north, east and radius, at the end, shape (obstacle, 3)."""
     traffic: Float32 | None
-    """Their centres at every sample, shape (time, obstacle, 2); None where none moves."""
+    """Centres of the obstacles at every sample, shape (time, obstacle, 2); None where none moves."""
     marks: Float32
-    """What the task draws: centre north, east and radius of circles, 0 for none, shape (time, mark, 3)."""
+    """Circles that the task draws: centre north, east and radius, 0 for none, shape (time, mark, 3)."""
     time_s: Float32
     """Shape (time,)."""
     references: Float32
@@ -79,17 +79,17 @@ class Recording(NamedTuple):
     heading: Float32
     """Heading in [-pi, pi), clockwise from north [rad], shape (time, vehicle)."""
     speed: Float32
-    """Over ground [m/s], shape (time, vehicle)."""
+    """Speed over ground [m/s], shape (time, vehicle)."""
     series: dict[str, Float32]
     """``min_spacing_m`` and ``obstacle_clearance_m``, the smallest since the sample before, ``centre_error_m``, and
-    ``collisions`` so far (not of a trace), shape (time,) each; NaN where there is nothing to measure."""
+    ``collisions`` so far (not of a trace), shape (time,) each; NaN where the value does not exist."""
     events: list[Event]
     force: Float32 | None
     """Length of the action since the sample before, as a share of full force, shape (time, vehicle); 0 at the start."""
     spacing: Float32 | None
     """Smallest distance to another vehicle since the sample before [m], NaN for none, shape (time, vehicle)."""
     inspections: dict[int, Inspection]
-    """What single vehicles heard, by index of the vehicle."""
+    """Inspections by index of the vehicle."""
     water: Water | None
     """None in still water."""
 

@@ -1,4 +1,4 @@
-"""Scenes of a recording, for the painter that draws live worlds too."""
+"""Scenes of a recording, for the environments' renderer."""
 
 import numpy as np
 
@@ -10,10 +10,10 @@ from uuv_marl.types import Bool
 
 
 class Scenes:
-    """Gives the scene of a recording at any time, with trails and the sonar of one inspected vehicle if asked.
+    """Scenes of a recording at any time, optionally with trails and the sonar of one inspected vehicle.
 
     Raises:
-        ReplayError: nothing was recorded of that vehicle's sonar.
+        ReplayError: the recording has no sonar of that vehicle.
     """
 
     def __init__(self, recording: Recording, sonar_of: int | None = None, *, trails: bool = True) -> None:
@@ -34,7 +34,7 @@ class Scenes:
         self._hits = np.array([self._place(event) for event in self._collisions if event.vehicles]).reshape(-1, 3)
 
     def at(self, time_s: float) -> Scene:
-        """The latest sample that is no later; the last one after the end."""
+        """The scene of the latest sample up to this time [s]."""
         recording = self.recording
         k = max(int(np.searchsorted(recording.time_s, time_s + 1e-6, side="right")) - 1, 0)
         now, alive = float(recording.time_s[k]), self._alive[k]
@@ -93,5 +93,5 @@ class Scenes:
 
 
 def _distance(metres: float) -> float:
-    """Infinite where there was nothing to measure."""
+    """The distance, infinite for NaN."""
     return metres if np.isfinite(metres) else np.inf

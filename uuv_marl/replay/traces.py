@@ -1,4 +1,4 @@
-"""Recordings of what a benchmark has saved: less than a simulation shows, but at once and without the policy."""
+"""Recordings from a benchmark's saved traces, without simulation and without the policy."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,6 +18,7 @@ from uuv_marl.replay.record import finite
 from uuv_marl.replay.recording import Event, Recording, Water
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.files import frozen
+from uuv_marl.scenario.messages import explain
 from uuv_marl.sim.disturbances.current import Flow, advance_gust, water
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trajectory import reference
@@ -39,31 +40,31 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "route_heading": ("sample", "vehicle"),
     "route_velocity": ("sample", "vehicle", 2),
 }
-"""Shapes of the arrays that a recording needs; equal names are equal sizes."""
+"""Shapes of the required arrays; equal names are equal sizes."""
 
 
 class Saved(NamedTuple):
-    """A benchmark's folder, and what its results.json says."""
+    """A benchmark's folder, and the content of its results.json."""
 
     folder: Path
     content: Content
 
     @staticmethod
     def at(folder: Path) -> "Saved":
-        """Raises ReplayError where there is no results.json of this version."""
+        """Read a folder. Raises ReplayError without a results.json."""
         if not (folder / FILE).is_file():
-            raise ReplayError(f"{folder} holds no {FILE}, which says what was run; {_ELSE}")
+            raise ReplayError(f"{folder} holds no {FILE} that describes the runs; {_ELSE}")
         return Saved(folder, read_content(folder / FILE, "run the benchmark again, into another --output"))
 
 
 def from_trace(path: UserPath) -> Recording:
-    """The recording of a file in the folder ``traces`` of a benchmark, as far as it goes.
+    """The recording of a file in the folder ``traces`` of a benchmark.
 
     It has no force, spacing of single vehicles, collisions over time or inspections.
 
     Raises:
-        ReplayError: it is no trace of a benchmark, or holds no routes.
-        ResultsError: it, or the results.json beside it, can't be read.
+        ReplayError: the file is not a trace of a benchmark, or holds no trajectories.
+        ResultsError: the file or its results.json can't be read.
     """
     path = user_path(path)
     if not path.exists():
@@ -72,20 +73,20 @@ def from_trace(path: UserPath) -> Recording:
     for row in saved.content["runs"]:
         if trace_path(saved.folder, *row[:3]) == path.absolute():
             return _recording(saved, row.scenario, row.policy, row.seed, row.metrics)
-    raise ReplayError(f"{path} is no trace of a run in {saved.folder / FILE}; {_ELSE}")
+    raise ReplayError(f"{path} is not the trace of a run in {saved.folder / FILE}; {_ELSE}")
 
 
 def from_folder(folder: UserPath, scenario: str | None, policy: str | None, seed: int) -> Recording:
-    """The recording of a run in a benchmark's folder, as ``from_trace`` gives it.
+    """The recording of a run in a benchmark's folder, see ``from_trace``.
 
     Args:
-        folder: that holds the results.json.
-        scenario: its name; None for the only one there.
-        policy: its name; None for the only one of that scenario.
-        seed: of the run.
+        folder: folder of the results.json.
+        scenario: its name; None if there is only one.
+        policy: its name; None if the scenario has only one.
+        seed: seed of the run.
 
     Raises:
-        ReplayError: the run is not there, or its trace holds no routes.
+        ReplayError: there is no such run, or its trace holds no trajectories.
         ResultsError: results.json or the trace can't be read.
     """
     saved = Saved.at(user_path(folder))
@@ -103,7 +104,7 @@ def from_folder(folder: UserPath, scenario: str | None, policy: str | None, seed
 
 
 def _chosen(folder: UserPath, option: str, wanted: str | None, held: set[str]) -> str:
-    """What is wanted, or the only one that is held."""
+    """The requested name, or the only one in the folder."""
     if wanted in held:
         return wanted
     if wanted is None and len(held) == 1:
@@ -113,7 +114,7 @@ def _chosen(folder: UserPath, option: str, wanted: str | None, held: set[str]) -
 
 
 def _listed(held: Iterable[Any]) -> str:
-    """The first of them, for a message."""
+    """The first names, for a message."""
     names = [str(name) for name in sorted(held)]
     return ", ".join(names[:_MOST_LISTED]) + (" and others" if len(names) > _MOST_LISTED else "")
 
@@ -124,7 +125,7 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
     trace = load_trace(path)
     if not any(array.startswith("route_") for array in trace):
         raise ReplayError(
-            f"{path} holds no routes: a benchmark keeps those of seed 0 alone. Simulate the run again, with the "
+            f"{path} holds no trajectories: a benchmark keeps only those of seed 0. Simulate the run again, with the "
             f"benchmark's own --set or file: {command(name, policy, seed)}"
         )
     _check(path, trace, scenario.swarm.num_vehicles)
@@ -133,7 +134,7 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
     spacing = np.minimum.reduceat(trace["min_spacing_m"], since)
     clearance = np.minimum.reduceat(trace["obstacle_distance_m"].min(axis=1, initial=np.inf), since)
     velocity, swarm = trace["route_velocity"], Swarm(scenario)
-    swarm.reset(seed)  # which decides alone who goes where, and how traffic and water move
+    swarm.reset(seed)  # determines groups, paths, traffic and water
     return Recording(
         scenario=scenario,
         policy=policy,
@@ -163,33 +164,32 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
 
 
 def _scenario(saved: Saved, name: str, policy: str) -> Scenario:
-    """The scenario that was run, with what the policy was granted."""
+    """The scenario of a run, with the policy's requirements."""
+    data = frozen(saved.content["scenarios"][name])
     try:
-        scenario = Scenario.model_validate(frozen(saved.content["scenarios"][name]))
+        scenario = Scenario.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(map(str, first["loc"]))
         raise ReplayError(
-            f"{saved.folder / FILE} describes {name!r} in the words of another version of uuv_marl ({field}: "
-            f"{first['msg']}); run the benchmark again"
+            f"{saved.folder / FILE} describes {name!r} as another version of uuv_marl "
+            f"({explain(error, data, Scenario)}); run the benchmark again"
         ) from None
     return with_requirements(policy, requirements_of(saved.content["policies"][policy]), scenario)
 
 
 def _check(path: Path, trace: dict[str, Float32], num_vehicles: int) -> None:
-    """Raise ReplayError where the arrays are not those of a trace of so many vehicles."""
+    """Raise ReplayError where arrays of a trace are missing or have another shape or type."""
     sizes: dict[str | int, int] = {2: 2, 3: 3, "vehicle": num_vehicles}
     for name, axes in _SHAPES.items():
         shape = trace[name].shape if name in trace and trace[name].dtype == np.float32 else ()
         if len(shape) != len(axes) or any(sizes.setdefault(a, n) != n for a, n in zip(axes, shape, strict=True)):
             got = f"is {trace[name].dtype} of shape {trace[name].shape}" if name in trace else "is missing"
-            raise ReplayError(f"{path} is no trace of this version of uuv_marl: {name} {got}; run the benchmark again")
+            raise ReplayError(f"{path} is not a trace of this version: {name} {got}; run the benchmark again")
     if not len(trace["route_time_s"]) or not np.isin(trace["route_time_s"], trace["time_s"]).all():
         raise ReplayError(f"{path}: route_time_s must be times of time_s; run the benchmark again")
 
 
 def _water(swarm: Swarm, time_s: Float32) -> Water | None:
-    """How the water moved since the reset."""
+    """Motion of the water since the reset."""
     scenario = swarm.scenario
     if not scenario.current.flows:
         return None
@@ -204,7 +204,7 @@ def _water(swarm: Swarm, time_s: Float32) -> Water | None:
 
 
 def _traffic(swarm: Swarm, time_s: Float32) -> Float32 | None:
-    """Where the scenario's traffic was since the reset."""
+    """Centres of moving obstacles since the reset, shape (time, obstacle, 2); None where none moves."""
     if not swarm.scenario.traffic.moves:
         return None
     control_step_s, places = swarm.scenario.timing.control_step_s, list[Float64]()
@@ -215,7 +215,7 @@ def _traffic(swarm: Swarm, time_s: Float32) -> Float32 | None:
 
 
 def _references(swarm: Swarm, time_s: Float32) -> Float32:
-    """Where each group's l(t) was, shape (time, group, 2)."""
+    """Position of each group's l(t), shape (time, group, 2)."""
     world_map, passes = swarm.world_map, swarm.scenario.arrival.criterion == "passage"
     trajectories = list(zip(world_map.waypoints[0], world_map.times[0], world_map.last[0].tolist(), strict=True))
     return np.array(
@@ -224,7 +224,7 @@ def _references(swarm: Swarm, time_s: Float32) -> Float32:
 
 
 def _events(scenario: Scenario, trace: dict[str, Float32], metrics: Metrics) -> list[Event]:
-    """What the series say, so that nobody is named but the lost; in the order of time."""
+    """Events from the series, sorted by time; only lost vehicles are named."""
     time, hull, limits = trace["time_s"], scenario.collision.hull_radius_m, scenario.constraints
     spacing, clearance = trace["min_spacing_m"], trace["obstacle_distance_m"].min(axis=1, initial=np.inf)
     marks = [

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from uuv_marl.percept import FLAG, PerceptField, Table
+from uuv_marl.percept import FLAG, FieldTable, PerceptField
 from uuv_marl.scenario.fields import Positive, within
 from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.start import start_state
@@ -42,7 +42,7 @@ class FewInformed(Reach):
 
     Numbers = FewInformedNumbers
     reference_label: ClassVar[str] = Task.reference_label
-    observed: ClassVar[Table] = (
+    observed: ClassVar[FieldTable] = (
         PerceptField("informed", (1,), FLAG, "1 if the vehicle perceives l(t); 0 if its reference always reads 0"),
     )
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": _TERMS, "leader": _TERMS}

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import AfterValidator
 
-from uuv_marl.percept import Table
+from uuv_marl.percept import FieldTable
 from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.scenario.fields import Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -120,7 +120,7 @@ class HardWater(Reach):
 
     Numbers = HardWaterNumbers
     Memory: ClassVar[type[Any] | None] = HardWaterMemory
-    channels: ClassVar[Mapping[str, Table]] = {"path": PATH_FIELDS}
+    channels: ClassVar[Mapping[str, FieldTable]] = {"path": PATH_FIELDS}
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {
         **Reach.rewards,
         "geodesic": {**Reach.rewards["dense"], "progress": "as in dense; d: length of the collision-free path"},

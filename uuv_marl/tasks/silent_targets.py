@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.percept import DIRECTION, PerceptField, Table
+from uuv_marl.percept import DIRECTION, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Positive, Section, within
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -85,8 +85,8 @@ def walk(
 ) -> None:  # fmt: skip
     """Fill the targets' velocities for the coming step; one that would leave the box is reflected.
 
-    ``worlds`` are stepped, ``time_s`` is since the reset, shape (world,) both; ``period`` of a step [s], ``half`` of the
-    box's side [m], turn ``rate`` [rad/s]; ``places`` [m] and ``velocity`` [m/s], north and east, shape (world,
+    ``worlds`` are stepped, ``time_s`` is since the reset, shape (world,) both; ``period`` of a step [s], ``half`` of
+    the box's side [m], turn ``rate`` [rad/s]; ``places`` [m] and ``velocity`` [m/s], north and east, shape (world,
     target, at least 2); ``memory`` is changed.
     """
     for w in range(memory.speed.shape[0]):
@@ -118,10 +118,10 @@ class SilentTargets(Reach):
 
     Numbers = SilentTargetsNumbers
     Memory: ClassVar[type[Any] | None] = SilentTargetsMemory
-    observed: ClassVar[Table] = (
+    observed: ClassVar[FieldTable] = (
         PerceptField("box", (2,), DIRECTION, "cosine and sine of the compass heading from the box's first axis"),
     )
-    channels: ClassVar[Mapping[str, Table]] = {"path": PATH_FIELDS}
+    channels: ClassVar[Mapping[str, FieldTable]] = {"path": PATH_FIELDS}
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
         **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "arrival"},
         "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no "

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.percept import CHANNELS, Table, percept_table
+from uuv_marl.percept import CHANNELS, FieldTable, percept_table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Section
 from uuv_marl.sim.episode_setup import EpisodeSetup, default_setup
@@ -61,14 +61,14 @@ class Task(RequiredMethods):
     Numbers: ClassVar[type[Section]] = Section
     """The task's own numbers, in the scenario's table ``task``; ranges as in ``scenario/fields.py``."""
     Memory: ClassVar[type[Any] | None] = None
-    """Table of the task's memory (``uuv_marl.sim.tables``): a NamedTuple of arrays over world and vehicle, zero at the
+    """FieldTable of the task's memory (``uuv_marl.sim.tables``): a NamedTuple of arrays over world and vehicle, zero at the
     start of an episode, and part of the swarm's snapshots."""
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {}}
     """The task's rewards by name, each with its terms in order and their formulas; the first is the default. Every
     environment adds ``team``: the mean of the first over all vehicles, and a lost vehicle's own term ``loss``."""
-    observed: ClassVar[Table] = ()
+    observed: ClassVar[FieldTable] = ()
     """Fields that the task adds to every percept and observation, see ``uuv_marl.percept.PerceptField``."""
-    channels: ClassVar[Mapping[str, Table]] = {}
+    channels: ClassVar[Mapping[str, FieldTable]] = {}
     """Fields that it adds where ``sonar.channels`` has this name: what no sensor of a vehicle could measure."""
     headline: ClassVar[str] = "success_share"
     """The metric, a share, by which policies are compared and trainings choose."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.percept import FLAG, PerceptField, Table
+from uuv_marl.percept import FLAG, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import NonNegative, Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -93,7 +93,7 @@ class TwoSwarms(Reach):
 
     Numbers = TwoSwarmsNumbers
     Memory: ClassVar[type[Any] | None] = TwoSwarmsMemory
-    channels: ClassVar[Mapping[str, Table]] = {"path": (*PATH_FIELDS, _TURN)}
+    channels: ClassVar[Mapping[str, FieldTable]] = {"path": (*PATH_FIELDS, _TURN)}
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
         **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "arrival"},
         "stay": "+w_arrival · dt/T while the vehicle is within near_m of its goal, and when all are, for the time that "

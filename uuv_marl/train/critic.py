@@ -1,4 +1,4 @@
-"""What the critic sees beyond the actor's observation: the truth about the whole world, which no vehicle knows."""
+"""Privileged input of the critic: the true state of the whole world, which no vehicle observes."""
 
 import numpy as np
 
@@ -6,17 +6,16 @@ from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float32, Float64
 
 PRIVILEGED_SIZE = 21
-"""Entries of it."""
+"""Entries of the privileged input of one vehicle."""
 
 
 def privileged(swarm: Swarm) -> Float32:
-    """What the critic sees beyond an observation, shape (world, vehicle, ``PRIVILEGED_SIZE``), body frame.
+    """Input of the critic beyond an observation, shape (world, vehicle, ``PRIVILEGED_SIZE``), in the body frame.
 
-    Means and extremes over the world's vehicles, however many: where the centre is and how it moves, how far the swarm
-    spreads, its smallest distances, the vehicle's own in all directions, its way to go, whether it has been paid for
-    its arrival (else leaving the goal looks as if that were still to come, and a policy learns to leave), and for how
-    long l(t) still moves. Not how long until the limit: who does not see it acts as if there were none, and no sample
-    from beyond holds such a value.
+    Means and extremes over a world's vehicles, for any number of them: position and motion of the centre, spread of
+    the swarm, its smallest distances, the vehicle's own distances, its path to the goal, whether it has had its reward
+    for arriving (without this a policy learns to leave the goal, as if the reward were still to come), and how long
+    l(t) still moves. The time limit is left out: actors do not observe it, and truncated episodes are bootstrapped.
     """
     state, facts = swarm.state, swarm.facts
     c, s = np.moveaxis(swarm.heading, -1, 0)
@@ -25,11 +24,8 @@ def privileged(swarm: Swarm) -> Float32:
     drift = velocity.mean(axis=1) - swarm.mean_reference[:, 2:]
     error = facts.centre - swarm.mean_reference[:, :2]
     size = np.hypot(*error.T)[:, None]
-    path_length, away, arrived_before = (
-        swarm.task.path_length_m(),
-        facts.away,
-        swarm.task.arrived_before().astype(np.float64),
-    )
+    path_length, away = swarm.task.path_length_m(), facts.away
+    arrived_before = swarm.task.arrived_before().astype(np.float64)
     moves = np.abs(swarm.mean_reference[:, 2:]).max(axis=1) > 0.0
     left = np.where(moves, swarm.duration_s - facts.time_s, 0.0)
     columns = [
@@ -58,6 +54,6 @@ def privileged(swarm: Swarm) -> Float32:
 
 
 def _turned(vector: Float64, c: Float64, s: Float64) -> tuple[Float64, Float64]:
-    """A north-east vector (world, vehicle or 1, 2) in the frame of bodies whose headings have cosine c and sine s."""
+    """A north-east vector (world, vehicle or 1, 2) in the body frame, for cosine ``c`` and sine ``s`` of headings."""
     x, y = vector[..., 0], vector[..., 1]
     return c * x + s * y, c * y - s * x

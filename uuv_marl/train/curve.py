@@ -1,4 +1,4 @@
-"""``curve.png``: how a training went."""
+"""``curve.png``: validations and reward of a training."""
 
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
@@ -10,9 +10,9 @@ from uuv_marl.benchmark.style import house_style, panels
 from uuv_marl.train.folder import Record
 
 _SHOWN = {
-    "share of validation episodes": {"swarm_success": "swarms whole", "share": "vehicles untouched and there"},
+    "share of validation episodes": {"swarm_success": "swarm success", "share": "success of vehicles"},
     "collisions per validation episode": {"collisions": ""},
-    "reward per decision, with noise\nand the cost of contacts": {"reward": ""},
+    "reward per decision, with noise\nand the cost of collisions": {"reward": ""},
 }
 
 
@@ -20,9 +20,9 @@ def draw_curve(rows: Sequence[Sequence[str]], path: Path, title: str) -> None:
     """Draw validations and reward over processor time.
 
     Args:
-        rows: of ``progress.csv``.
-        path: of the picture.
-        title: above it.
+        rows: rows of ``progress.csv``.
+        path: file of the picture.
+        title: text above the picture.
     """
     with house_style():
         figure, axes = panels(len(_SHOWN), 3, (4.2, 3.2))

@@ -1,4 +1,4 @@
-"""A training on disk: what it is, a row per iteration, and the last checkpoint, whole at any time."""
+"""The folder of a training: its description, a row per iteration, and the last checkpoint, complete at any time."""
 
 import json
 import math
@@ -22,18 +22,18 @@ from uuv_marl.train.training import Training
 _CHECKPOINT_NAME = re.compile(r"\d{6,}(\.partial)?")
 """Names of checkpoints; everything else under ``checkpoints`` is the user's."""
 _HIDDEN = re.compile(r"\..*|config\.partial\.json")
-"""What a first start may leave behind that was killed before it wrote its settings."""
+"""Files that a start may leave if it is killed before it writes its settings."""
 _LIBRARIES = ("torch", "numpy", "numba", "safetensors")
 
 Say = Callable[[str], object]
-"""Tells whoever started a training how it goes on."""
+"""Called with messages about the progress of a training."""
 
 Stop = Callable[[], bool]
-"""Asked after every iteration; where it says so, the training ends with a checkpoint."""
+"""Called after every iteration; the training ends with a checkpoint once it returns True."""
 
 
 def quiet(_: str) -> None:
-    """Says nothing."""
+    """Discard a message."""
 
 
 class Record(NamedTuple):
@@ -44,45 +44,45 @@ class Record(NamedTuple):
     seconds: float = 0.0
     """Processor time of the training so far, validations apart."""
     reward: float | None = None
-    """Mean per decision and vehicle, of this iteration's samples, less what contacts cost by then."""
+    """Mean per decision and vehicle in this iteration, less the cost of collisions."""
     kl: float | None = None
-    """Divergence from the policy that sampled, or in a lesson from the teacher, to the one that learned."""
+    """Divergence from the policy that sampled, or from the expert while it is imitated, to the updated policy."""
     explained: float | None = None
     """Share of the returns' variance that the critic explains."""
     best: float | None = None
     """Score of the best validation so far."""
     swarm_success: float | None = None
-    """Of this iteration's validation, as ``validation.Judged`` has them; None without one."""
+    """From this iteration's ``validation.Validation``, as the next three; None without one."""
     share: float | None = None
     collisions: float | None = None
     time_s: float | None = None
 
     def spent(self, training: Training) -> float:
-        """How much of a training's kind of budget is spent: agent-steps, or seconds."""
+        """The part of the budget that is spent, in its unit: agent-steps, or seconds."""
         return self.agent_steps if training.steps else self.seconds
 
 
 class TrainingFolder:
-    """``config.json``, ``progress.csv`` and ``checkpoints/`` of a training; ``opened`` makes one.
+    """``config.json``, ``progress.csv`` and ``checkpoints/`` of a training, see ``opened``.
 
     Nothing is written before ``begin``.
 
     Args:
-        path: new or empty, or that of an earlier training.
-        training: to begin; None to go on with what the folder holds.
+        path: a new or empty folder, or that of an earlier training.
+        training: description of a new training; None to resume the one in the folder.
 
     Raises:
-        ResultsError: the folder is used, or holds no training to go on with.
+        ResultsError: the folder is in use, or holds no training to resume.
     """
 
     def __init__(self, path: Path, training: Training | None) -> None:
         self.path = path
         self.until = 0.0
-        """The budget to which the training was to go when it was run last: agent-steps, or seconds."""
+        """The budget of the latest run: agent-steps, or seconds."""
         self.record = Record()
-        """The last iteration that is kept; iteration 0 where there is none."""
+        """The last iteration with a checkpoint; iteration 0 where there is none."""
         self.resume_note = ""
-        """What a resume goes on from, in words."""
+        """Message that says where a resumed training starts."""
         if training is None:
             self.training = self._read()
             self._find()
@@ -96,34 +96,32 @@ class TrainingFolder:
         """The training that the folder holds."""
         try:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
-            before, self.until, saved_versions = (
-                dict(config["scenarios"]),
-                float(config["until"]),
-                dict(config["versions"]),
-            )
-            training = Training(**config["training"])
+            before, saved_versions = dict(config["scenarios"]), dict(config["versions"])
+            self.until, training = float(config["until"]), Training(**config["training"])
             scenarios_now = _read_by(training)
         except (ScenarioError, PolicyError, TrainingError) as error:
             raise ResultsError(
-                f"the training in {self.path} can't be made again here: {error}; resume it where it was begun"
+                f"the training in {self.path} can't be loaded here: {error}; resume it where it was started"
             ) from None
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ResultsError(
                 f"{self.path} holds no training to resume (config.json: {error}); leave out --resume, and give an "
                 "empty --output"
             ) from None
-        for name, resume_note in scenarios_now.items():
-            for field, then, now in _differences(before.get(name, resume_note), resume_note):
+        for name, content in scenarios_now.items():
+            for field, then, now in _differences(before.get(name, content), content):
                 raise ResultsError(
-                    f"{self.path} was begun with {field} = {then}, and {field} is {now} now; give {name} as it was, or "
-                    "begin anew with another --output"
+                    f"{self.path} was started with {field} = {then}, and {field} is {now} now; restore {name}, or "
+                    "start again with another --output"
                 )
         other = [f"{name} {old}" for name, old in saved_versions.items() if old != versions().get(name)]
-        self.version_note = f"; so far it was made by {', '.join(other)}, so no longer bit for bit" if other else ""
+        self.version_note = (
+            f"; earlier parts ran with {', '.join(other)}, so the result is not bit-identical" if other else ""
+        )
         return training
 
     def _find(self) -> None:
-        """The last whole checkpoint."""
+        """Find the last complete checkpoint."""
         broken = ""
         checkpoints = [path for path in self._checkpoints.glob("*") if path.name.isdecimal() and _ours(path)]
         for path in sorted(checkpoints, reverse=True):
@@ -137,17 +135,17 @@ class TrainingFolder:
             else:
                 self.record = record
                 done = f"iteration {record.iteration}, {record.agent_steps:,} agent-steps"
-                self.resume_note = f"{broken}going on from {done}"
+                self.resume_note = f"{broken}resuming from {done}"
                 return
         if broken:
-            raise ResultsError(f"{broken}copy it again as a whole, or delete it to start at the beginning")
-        self.resume_note = f"{self.path} holds no checkpoint yet: starting at the beginning"
+            raise ResultsError(f"{broken}copy the whole folder again, or delete it to start from the beginning")
+        self.resume_note = f"{self.path} holds no checkpoint yet: starting from the beginning"
 
     def budget_with(self, minutes: float | None, steps: int | None) -> float:
-        """The budget to go on to, more of the training's own kind: agent-steps, or seconds.
+        """The total budget of a resumed training in its own unit: agent-steps, or seconds.
 
         Raises:
-            TrainingError: the training has the other kind.
+            TrainingError: the given budget has the other unit.
         """
         kind, other = ("steps", "minutes") if self.training.steps else ("minutes", "steps")
         budgets = {"minutes": minutes and 60.0 * minutes, "steps": steps}
@@ -164,11 +162,11 @@ class TrainingFolder:
 
     @property
     def checkpoint(self) -> Path | None:
-        """Where the last iteration's checkpoint is."""
+        """Folder of the last checkpoint."""
         return self._checkpoints / f"{self.record.iteration:06d}" if self.record.iteration else None
 
     def begin(self, until: float) -> None:
-        """Make the folder ready for the next iteration, and note how it comes about: budget, versions."""
+        """Prepare the folder for the next iteration, and write the settings, budget and versions."""
         config = {
             "training": self.training.model_dump(mode="json"),
             "scenarios": _read_by(self.training),
@@ -178,20 +176,20 @@ class TrainingFolder:
         write_text(self.path / "config.json", json.dumps(config, indent=1) + "\n")
         with writing(self._checkpoints):
             self._checkpoints.mkdir(exist_ok=True)
-        # An iteration whose checkpoint was cut off will come again.
+        # Iterations after the last checkpoint run again.
         rows = [row for row in self.rows() if int(row[0]) <= self.record.iteration]
         write_text(self._table, "".join(map(_line, [Record._fields, *rows])))
 
     def note(self, record: Record) -> None:
-        """A row for an iteration."""
+        """Append the row of an iteration."""
         with writing(self._table), self._table.open("a", encoding="utf-8") as file:
             file.write(_line(record))
 
     def keep(self, record: Record, save: Callable[[Path], object]) -> None:
-        """A checkpoint, which ``save`` writes into the folder it is given; older ones go, once it is whole.
+        """Write a checkpoint by ``save(folder)``, then delete older ones.
 
         Raises:
-            ResultsError: it can't be written; the one before is as it was.
+            ResultsError: it can't be written; the previous one stays unchanged.
         """
         folder = self._checkpoints / f"{record.iteration:06d}"
         partial = folder.with_suffix(".partial")
@@ -199,15 +197,15 @@ class TrainingFolder:
             shutil.rmtree(partial, ignore_errors=True)
             save(partial.resolve())
             (partial / "record.json").write_text(json.dumps(record._asdict()) + "\n", encoding="utf-8")
-            shutil.rmtree(folder, ignore_errors=True)  # where it was incomplete
-            partial.rename(folder)  # whole from the moment when it is there
+            shutil.rmtree(folder, ignore_errors=True)
+            partial.rename(folder)  # atomic
         self.record = record
         for other in self._checkpoints.iterdir():
             if other != folder and _ours(other):
                 shutil.rmtree(other, ignore_errors=True)
 
     def rows(self) -> list[list[str]]:
-        """Those of ``progress.csv``, without its head and without what is damaged."""
+        """Rows of ``progress.csv``, without its header and damaged lines."""
         lines = self._table.read_text(encoding="utf-8", errors="replace").splitlines() if self._table.exists() else []
         rows = [line.split(",") for line in lines]
         return [row for row in rows if len(row) == len(Record._fields) and row[0].isdecimal()]
@@ -219,16 +217,12 @@ class TrainingFolder:
 
 @contextmanager
 def opened(path: Path, training: Training | None, say: Say = quiet) -> Iterator[TrainingFolder]:
-    """The folder of a training, for the block alone.
+    """The folder of a training, locked for the block; arguments as for ``TrainingFolder``.
 
-    Args:
-        path: new or empty, or that of an earlier training.
-        training: to begin; None to go on with what the folder holds.
-        say: told from where a resume goes on.
+    ``say`` is called with where a resumed training starts.
 
     Raises:
-        ResultsError: the folder is used, by another process too, or holds no training to go on with, or it can't be
-            written.
+        ResultsError: the folder is in use, holds no training to resume, or can't be written.
     """
     TrainingFolder(path, training)  # refuses before anything is written
     with locked(path):
@@ -239,7 +233,7 @@ def opened(path: Path, training: Training | None, say: Say = quiet) -> Iterator[
 
 
 def _read_by(training: Training) -> dict[str, Any]:
-    """What a training reads beside its description, by name: its scenarios, and the digest of an expert's file."""
+    """Inputs of a training beyond its description, by name: its scenarios, and the digest of an expert's file."""
     contents: dict[str, Any] = {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
     policy_type = policy_class(training.expert) if training.expert else None
     if isinstance(policy_type, Trained):
@@ -261,7 +255,7 @@ def _line(row: Sequence[object]) -> str:
 
 
 def _differences(then: Any, now: Any, field: str = "") -> Iterator[tuple[str, object, object]]:
-    """Where a scenario is not what it was: field, before, now."""
+    """Differences between two versions of a scenario: field, before, now."""
     if isinstance(then, dict) and isinstance(now, dict):
         for name in {**now, **then}:
             yield from _differences(then.get(name), now.get(name), f"{field}.{name}" if field else name)

@@ -1,4 +1,4 @@
-"""The networks of ``uuv_marl.baselines.learned.layers`` in torch, with gradients and through time. Needs ``train``."""
+"""The networks of ``uuv_marl.baselines.learned.layers`` in torch, trained through time. Needs ``train``."""
 
 import math
 from collections.abc import Sequence
@@ -27,12 +27,12 @@ class TorchOps:
 
     @staticmethod
     def take(x: Tensor, columns: NDArray[np.int64]) -> Tensor:
-        """Some columns."""
+        """Selected columns (row, column)."""
         return x.index_select(1, torch.from_numpy(columns))
 
     @staticmethod
     def joined(parts: Sequence[Tensor]) -> Tensor:
-        """Columns side by side."""
+        """Concatenation of the columns."""
         return torch.cat(list(parts), 1)
 
     @staticmethod
@@ -47,7 +47,7 @@ class TorchOps:
 
 
 class TorchActor:
-    """The policy's network, and its memory through time."""
+    """The policy's network with its recurrent state."""
 
     def __init__(self, architecture: Architecture, sizes: Sizes, rng: np.random.Generator) -> None:
         last = f"{len(architecture.hidden)}.weight"
@@ -55,7 +55,7 @@ class TorchActor:
             name: started(shape, rng, 0.01 if name == last else 1.0 if name.startswith("gru") else math.sqrt(2.0))
             for name, shape in shapes(architecture, sizes).items()
         }
-        if architecture.memory:  # of each gate by itself
+        if architecture.memory:  # each gate separately
             own = self.tensors["gru.state_weight"]
             gates = [started((len(own), len(own)), rng, 1.0) for _ in range(3)]
             self.tensors["gru.state_weight"] = torch.cat(gates, 1).detach().requires_grad_()
@@ -63,7 +63,7 @@ class TorchActor:
         self.network = Network(architecture, sizes, self.tensors, TorchOps)
 
     def act(self, x: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Actions (row, 2) for observations (row, entry) and the memory's state, and its next state (row, unit)."""
+        """Actions (row, 2) and the next state (row, unit), from observations (row, entry) and the state."""
         z = self.network.features(x)
         if not self.units:
             return self.network.output(z), state
@@ -71,7 +71,7 @@ class TorchActor:
         return self.network.output(z, state), state
 
     def through(self, x: Tensor, state: Tensor, continues: Tensor) -> tuple[Tensor, Tensor]:
-        """The same for a horizon: actions (time x row, 2), and the states after each decision (time x row, unit)."""
+        """``act`` over a horizon: actions (time x row, 2), and the states after each decision (time x row, unit)."""
         flat = x.reshape(-1, x.shape[2])
         z = self.network.features(flat)
         if not self.units:
@@ -85,7 +85,7 @@ class TorchActor:
 
 
 def started(shape: tuple[int, ...], rng: np.random.Generator, gain: float) -> Tensor:
-    """A new weight, orthogonal, or a bias, zero; with no draw from torch's global generator."""
+    """An initial orthogonal weight or zero bias, without torch's global random generator."""
     tensor = torch.zeros(shape)
     if len(shape) > 1:
         generator = torch.Generator().manual_seed(int(rng.integers(2**62)))

@@ -1,9 +1,8 @@
-"""PPO for all vehicles at once, which share one actor (Yu et al. 2022): MAPPO, or IPPO, by what the critic sees.
+"""PPO with one actor for all vehicles (Yu et al. 2022): MAPPO or IPPO, depending on the critic's input.
 
-The actor (``uuv_marl.train.network``) is one that also runs without torch. With a memory a
-minibatch is the whole horizon of a part of the vehicles, so that it is trained through time; its state at the horizon's
-start is the one that it had. Action noise is not learned but annealed. One thread: a seed gives one training, bit for
-bit. Needs ``train``.
+The actor (``uuv_marl.train.network``) also runs without torch. With a memory, a minibatch is the whole horizon of some
+of the vehicles, and gradients flow through time from the recorded state at its start. Action noise is annealed, not
+learned. Training uses one thread, so a seed determines it bit for bit. Needs ``train``.
 """
 
 import itertools
@@ -28,45 +27,45 @@ with extra("train", "training"):
 _CRITIC = (64, 64)
 """Units of the critic's layers, tanh."""
 _IMITATION_EPOCHS = 2
-"""Passes over a batch in a lesson."""
+"""Passes over a batch during imitation."""
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
-"""What the optimiser keeps of each tensor."""
+"""State of the optimiser for each tensor."""
 
 
 class Update(NamedTuple):
-    """How an update went."""
+    """Diagnostics of an update."""
 
     kl: float
     explained: float
 
 
 class Rollout(NamedTuple):
-    """Samples, shape (time, row, ...)."""
+    """Samples of a horizon, shape (time, row, ...)."""
 
     observation: Tensor
     action: Tensor
     mean: Tensor
     """Mean action of the policy that sampled."""
     expert_action: Tensor
-    """What the teacher would have done, if it was asked."""
+    """The expert's actions, where it is queried."""
     advantage: Tensor
     returns: Tensor
     continues: Tensor
     """0 where an episode begins, else 1."""
     state: Tensor
-    """The memory's before the first decision, shape (row, unit)."""
+    """Recurrent state before the first decision, shape (row, unit)."""
 
 
 class Learner:
-    """Actor, critic, their optimisers, the scale of returns, and what each row remembers.
+    """Actor, critic, their optimiser, the scale of returns, and the recurrent state of each row.
 
     Args:
-        made: what the actor is made of.
-        sizes: rows of the actor's observation.
-        size: the critic's inputs, of which the first are the actor's.
-        rows: vehicles that act at once.
-        by: the algorithm's numbers.
-        rng: draws the first weights, noise, and the order of samples.
+        architecture: of the actor's network.
+        sizes: fields of the actor's observation.
+        size: number of the critic's inputs, of which the first are the actor's.
+        rows: number of vehicles.
+        config: hyperparameters.
+        rng: for initial weights, noise, and the order of samples.
     """
 
     def __init__(
@@ -82,20 +81,18 @@ class Learner:
         self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
         self.state = torch.zeros(rows, self.actor.units)
         self.imitating = False
-        """Whether the actor imitates a teacher, instead of what paid; set by ``teach``."""
+        """Whether the actor imitates an expert instead of maximising reward."""
         self.imitation_weight = 0.0
-        """Weight in PPO's loss of the squared distance from what the teacher would do [1]; set by ``teach``."""
+        """Weight in PPO's loss of the squared distance from the expert's action [1]."""
 
     def set_imitation(self, imitating: bool, imitation_weight: float = 0.0) -> None:
-        """From now on the actor imitates a teacher, or learns what pays, with a ``pull`` to the teacher."""
-        if (
-            self.imitating and not imitating
-        ):  # with the old optimiser the first updates went twice as far, by ``Update.kl``
+        """Switch imitation on or off, and set ``imitation_weight`` of PPO's loss."""
+        if self.imitating and not imitating:  # the old moments would double the first updates' ``Update.kl``
             self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
         self.imitating, self.imitation_weight = imitating, imitation_weight
 
     def _critic_output(self, x: Tensor, state: Tensor) -> Tensor:
-        """The critic's output (row,), in the scale of returns, for what it sees (row, entry) and the memory's state."""
+        """Normalised values (row,) of the critic's inputs (row, entry) and the recurrent state."""
         x = torch.cat([x, state], 1)
         for k in range(0, len(self.critic), 2):
             x = torch.addmm(self.critic[k + 1], x, self.critic[k])
@@ -104,27 +101,23 @@ class Learner:
 
     @torch.no_grad()
     def value(self, seen: Tensor, state: Tensor) -> Float32:
-        """What the critic expects of returns, shape (row,)."""
+        """Expected returns, shape (row,)."""
         mean, std = self._scale()
         return self._critic_output(seen, state).numpy() * np.float32(std) + np.float32(mean)
 
     @torch.no_grad()
     def act(self, seen: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Actions without noise (row, 2), and the memory's next state, for what the critic sees."""
+        """Mean actions (row, 2) and the next recurrent state, from the critic's inputs (row, entry)."""
         return self.actor.act(seen[:, : self._features], state)
 
     def sample(self, env: Rows, noise: float) -> tuple[Rollout, float]:
-        """``horizon`` decisions of an environment with noisy actions, and the mean reward."""
+        """Samples of ``horizon`` decisions with noisy actions, and the mean reward."""
         config, shape = self.config, (self.config.horizon, env.rows)
         observation = torch.empty((config.horizon + 1, env.rows, env.size))
         action, mean, expert_action = torch.empty((3, *shape, 2))
         states = torch.empty((config.horizon + 1, env.rows, self.actor.units))
-        reward, mean_reward, ended = (
-            np.empty(shape, np.float32),
-            0.0,
-            np.zeros((config.horizon + 1, env.rows), np.bool_),
-        )
-        first = self.state
+        reward, ended = np.empty(shape, np.float32), np.zeros((config.horizon + 1, env.rows), np.bool_)
+        mean_reward, first = 0.0, self.state
         for t in range(config.horizon):
             observation[t] = torch.from_numpy(env.observation)
             mean[t], states[t] = self.act(observation[t], self.state)
@@ -151,13 +144,13 @@ class Learner:
         return Rollout(observation[:-1], action, mean, expert_action, *arrays, continues, first), mean_reward
 
     def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
-        """Some epochs of PPO on a batch, or of its lesson, and of regression to its returns."""
+        """Train actor and critic on a batch: by PPO, or by imitation of the expert."""
         self._optimiser.param_groups[0]["lr"] = learning_rate
         error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
         self._follow(batch.returns.double())
         spread = batch.advantage.std(correction=0) + 1e-8
         batch = batch._replace(advantage=(batch.advantage - batch.advantage.mean()) / spread)
-        if not self.actor.units:  # moments stand for themselves, and are mixed
+        if not self.actor.units:  # without a memory, samples of all times are shuffled
             mixed = {name: x.reshape(1, -1, *x.shape[2:]) for name, x in batch._asdict().items() if name != "state"}
             batch = Rollout(**mixed, state=torch.zeros(batch.action[..., 0].numel(), 0))
         (mean, std), kl = self._scale(), 0.0
@@ -171,7 +164,7 @@ class Learner:
         return Update(kl, 1.0 - error)
 
     def _descend(self, batch: Rollout, rows: Tensor, noise: float) -> float:
-        """One gradient step on some rows; the divergence from the policy that sampled, or from the teacher."""
+        """One gradient step on some rows; the divergence from the policy that sampled, or from the expert."""
         x, action, old, expert_action, advantage, returns, continues = (
             array.index_select(1, rows) for array in batch[:7]
         )
@@ -193,7 +186,7 @@ class Learner:
         return apart.item() / double
 
     def _scale(self) -> tuple[float, float]:
-        """Mean and standard deviation of returns; 0 and 1 before the first."""
+        """Running mean and standard deviation of returns; 0 and 1 at first."""
         weight, total, squares = self._moments
         if weight == 0.0:
             return 0.0, 1.0
@@ -202,7 +195,7 @@ class Learner:
 
     @torch.no_grad()
     def _follow(self, returns: Tensor) -> None:
-        """Note these returns, and keep the critic's values where their scale moves (PopArt, Hessel et al. 2019)."""
+        """Update the scale of returns, and preserve the critic's values (PopArt, Hessel et al. 2019)."""
         first, (mean, std), decay = not self._moments.any(), self._scale(), self.config.value_decay
         fresh = np.array([1.0, returns.mean().item(), returns.square().mean().item()])
         self._moments = decay * self._moments + (1.0 - decay) * fresh
@@ -213,11 +206,11 @@ class Learner:
 
     @property
     def weights(self) -> dict[str, NDArray[Any]]:
-        """The actor's, for a checkpoint."""
+        """The actor's weights, for a checkpoint."""
         return {name: x.detach().numpy().copy() for name, x in self.actor.tensors.items()}
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """All of it, for ``restore``."""
+        """The complete state, for ``restore``."""
         tensors = {"state": self.state, **{f"actor.{name}": x for name, x in self.actor.tensors.items()}}
         tensors |= {f"critic.{k}": x for k, x in enumerate(self.critic)}
         for k, moments in self._optimiser.state_dict()["state"].items():
@@ -227,7 +220,7 @@ class Learner:
 
     @torch.no_grad()
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Go on with the ``arrays`` of a learner of the same sizes."""
+        """Restore the ``arrays`` of a learner of the same sizes."""
         if begun := any(name.startswith("adam.") for name in arrays):
             wanted = {f"adam.{k}.{name}" for k in range(sum(map(len, self._parts))) for name in _ADAM}
             if lacking := sorted(wanted - arrays.keys()):
@@ -252,10 +245,10 @@ def gae(reward: Float32, value: Float32, ended: Bool, gamma: float, lam: float) 
     """Generalised advantages (Schulman et al. 2016, Eq. 16), shape (time, row).
 
     Args:
-        reward: shape (time, row); where an episode was cut off, plus gamma times the value of where it would go on.
+        reward: shape (time, row); plus gamma times the value of the next state where an episode is truncated.
         value: shape (time + 1, row).
-        ended: the episode ended by this step, and the next value is another episode's; shape (time, row).
-        gamma: discount.
+        ended: whether the episode ended at this step, shape (time, row).
+        gamma: discount factor.
         lam: weight of longer returns.
     """
     advantage = np.zeros_like(reward)
@@ -268,7 +261,7 @@ def gae(reward: Float32, value: Float32, ended: Bool, gamma: float, lam: float) 
 
 
 def annealed(ends: tuple[float, float], share: float) -> float:
-    """A number from the first to the second, in equal ratios as ``share`` goes from 0 to 1, or evenly if one is 0."""
+    """Geometric interpolation between ``ends`` as ``share`` goes from 0 to 1; linear if one end is 0."""
     if min(ends) == 0.0:
         return ends[0] + (ends[1] - ends[0]) * min(share, 1.0)
     return ends[0] * (ends[1] / ends[0]) ** min(share, 1.0)

@@ -1,4 +1,4 @@
-"""``Rows``: swarms of several sizes, stepped as one flat array of vehicles; worlds that end start anew."""
+"""``Rows``: swarms of several sizes as one flat array of vehicles, with automatic resets."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -20,39 +20,39 @@ from uuv_marl.train.training import Part, Training
 from uuv_marl.types import Bool, Float32
 
 TRAINING_SEEDS = (100_000, 900_000)
-"""Worlds are drawn from these; 900,000-999,999 are for validation."""
+"""Range of the seeds of training; 900,000-999,999 are for validation."""
 
 Seeds = Callable[[int], Sequence[int] | NDArray[np.integer]]
-"""Seeds for so many worlds that start."""
+"""Gives the requested number of seeds for worlds that start."""
 
 
 class Transition(NamedTuple):
-    """What came of one action, a row for every vehicle."""
+    """Result of one step, a row for every vehicle."""
 
     reward: Float32
     terminated: Bool
-    """The task is done."""
+    """Whether the task has ended."""
     truncated: Bool
-    """The episode was cut off."""
+    """Whether the episode was cut off."""
     final: Float32
-    """What the critic would have seen next, for the truncated rows, in their order."""
+    """Final inputs of the critic in the truncated rows, shape (truncated row, entry)."""
 
 
 class ExternalActionPolicy(Policy):
-    """Does what it is told: it stands where the network will."""
+    """A policy whose actions are set from outside, in place of the network."""
 
     def __init__(self, scenario: Scenario, num_worlds: int, card: Card) -> None:
-        self.copy_requirements(card)
+        self.requirements = card.requirements
         super().__init__(scenario, num_worlds)
         self.action = np.zeros((num_worlds, scenario.swarm.num_vehicles, 2), np.float32)
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002
-        """The action, shape (world, vehicle, 2)."""
+        """Actions of shape (world, vehicle, 2)."""
         return self.action.copy()
 
 
 class Group:
-    """Worlds of one scenario and swarm size, and what decides beside the network, if anything does."""
+    """Worlds of one scenario and swarm size, with the base controller, filter and expert of the training."""
 
     def __init__(self, training: Training, part: Part) -> None:
         scenario, card = part.scenario, training.card
@@ -62,35 +62,35 @@ class Group:
         self._acting = compose(self._network_action, card)
         self._shape, self._state = (part.worlds, part.vehicles), training.critic == "state"
         self.collision_cost = 0.0
-        """What a contact that begins costs beyond the reward."""
+        """Cost of a collision beyond the reward."""
         try:
             self._expert = make_policy(training.expert, scenario, part.worlds) if training.expert else None
         except PolicyError as error:
-            raise TrainingError(f"teacher = {training.expert!r} can't teach on {part.name}: {error}") from None
+            raise TrainingError(f"expert = {training.expert!r} can't run on {part.name}: {error}") from None
         self.expert_share = 1.0
-        """The share of worlds that start in which the teacher acts."""
+        """Share of the worlds that start in which the expert acts."""
         self._expert_acts = np.ones(part.worlds, np.bool_)
 
     def seen(self, observation: Float32) -> Float32:
-        """What the critic sees with these observations (world, vehicle, entry), shape (row, entry)."""
+        """Inputs of the critic (row, entry), from observations (world, vehicle, entry)."""
         parts = [observation, privileged(self.env.swarm)] if self._state else [observation]
         return np.concatenate(parts, axis=2).reshape(self._shape[0] * self._shape[1], -1)
 
     def start(self, seeds: Sequence[int], worlds: Sequence[int]) -> Float32:
-        """Start these worlds; what all observe."""
+        """Start these worlds; observations of all worlds (world, vehicle, entry)."""
         if self._expert is not None:
             self._expert.reset(seeds, worlds)
-        # By their seeds, which are drawn: it takes no random number of its own.
+        # Chosen by the seeds, so that no random number is drawn.
         self._expert_acts[worlds] = [seed % 100 < 100.0 * self.expert_share for seed in seeds]
         return self.env.reset(seeds, worlds)
 
     def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
-        """What the teacher would do, and what is done: that, in its own worlds, or ``action``; shape (row, 2)."""
+        """The expert's actions, and those to execute, in its own worlds the expert's; shape (row, 2)."""
         expert_action = cast(Policy, self._expert).act(self.env.swarm.percept).reshape(-1, 2).copy()
         return expert_action, np.where(np.repeat(self._expert_acts, self._shape[1])[:, None], expert_action, action)
 
     def step(self, action: Float32, seeds: Seeds) -> tuple[Float32, Bool, Bool, Float32, Float32]:
-        """Reward, done and cut off by row, what the critic sees now, and saw last of rows that were cut off."""
+        """Reward, terminated and truncated by row, the critic's inputs, and its final ones in truncated rows."""
         env, n = self.env, self._shape[1]
         action = action.copy()
         bound(action, in_disc(self._network_action))
@@ -110,12 +110,12 @@ class Group:
         return reward.reshape(-1).astype(np.float32), done, cut, self.seen(observation), final
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """All that ``restore`` needs, but what was observed."""
+        """The state for ``restore``, without observations."""
         expert_state = {"expert_acts": self._expert_acts.copy()} | parts_of(expert=self._expert) if self._expert else {}
         return self.env.swarm.snapshot() | parts_of(acting=self._acting) | expert_state
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a snapshot of a group of the same size."""
+        """Restore a snapshot of a group of the same size."""
         self.env.reset(0)
         self.env.swarm.restore(snapshot)
         self._acting.restore(part_of(snapshot, "acting"))
@@ -125,13 +125,13 @@ class Group:
 
 
 class Rows:
-    """Vehicles of many worlds as rows; ``observation`` (row, ``size``) is what the critic sees of each now.
+    """Vehicles of many worlds as rows; ``observation`` (row, ``size``) holds the critic's inputs.
 
-    The first ``features`` entries are the actor's. Rows run over swarms, their worlds, and vehicles.
+    The first ``features`` entries are the actor's. Rows are ordered by scenario, size, world and vehicle.
 
     Args:
-        training: says what is trained on.
-        seeds: asked for seeds whenever worlds start; a snapshot and what it draws from determine all that follows.
+        training: gives scenarios, sizes and reward.
+        seeds: called whenever worlds start; a snapshot and its generator determine all that follows.
     """
 
     def __init__(self, training: Training, seeds: Seeds) -> None:
@@ -149,24 +149,23 @@ class Rows:
             self.observation[rows] = group.seen(started)
 
     def set_collision_cost(self, collision_cost: float) -> None:
-        """From now on a contact that begins costs so much beyond the reward."""
+        """Set the cost of a collision beyond the reward."""
         for group in self.groups:
             group.collision_cost = collision_cost
 
     def set_expert_share(self, share: float) -> None:
-        """From now on the teacher acts in so many of the worlds that start."""
+        """Set the share of the worlds that start in which the expert acts."""
         for group in self.groups:
             group.expert_share = share
 
     def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
-        """What the teacher would do, and what is done where the network does ``action``; shape (row, 2)."""
+        """The expert's actions, and the actions to execute where the network's are ``action``; all (row, 2)."""
         pairs = [group.query_expert(action[rows]) for group, rows in zip(self.groups, self._rows, strict=True)]
-        return np.concatenate([expert_action for expert_action, _ in pairs]), np.concatenate(
-            [done for _, done in pairs]
-        )
+        expert_actions, executed = zip(*pairs, strict=True)
+        return np.concatenate(expert_actions), np.concatenate(executed)
 
     def step(self, action: Float32) -> Transition:
-        """Act, shape (row, 2)."""
+        """Step all worlds with actions (row, 2)."""
         reward, ended = np.empty(self.rows, np.float32), np.empty((2, self.rows), np.bool_)
         finals = [np.empty((0, self.size), np.float32)]
         for group, rows in zip(self.groups, self._rows, strict=True):
@@ -176,13 +175,13 @@ class Rows:
         return Transition(reward, ended[0], ended[1], np.concatenate(finals))
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """All but the generator, for ``restore``."""
+        """The state for ``restore``, without the random generator."""
         groups = enumerate(group.snapshot() for group in self.groups)
         arrays = {f"{k}.{name}": array for k, group in groups for name, array in group.items()}
         return arrays | {"observation": self.observation.copy()}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from a snapshot of rows for the same training."""
+        """Restore a snapshot of the same training."""
         for k, group in enumerate(self.groups):
             group.restore(part_of(snapshot, str(k)))
         self.observation[...] = snapshot["observation"]

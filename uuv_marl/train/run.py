@@ -1,4 +1,4 @@
-"""A training at work: iterations, validations, and files from which it goes on exactly.
+"""Running a training: iterations, validations, and files from which it resumes exactly.
 
 ``config.json``, ``progress.csv`` and ``checkpoints/`` as ``uuv_marl.train.folder`` keeps them; ``best/``, the policy of
 the best validation; ``curve.png``. Needs ``train``.
@@ -36,31 +36,31 @@ with extra("train", "training"):
     import torch
 
 _EXPERT_ACTS, _NETWORK_ACTS = 0.2, 0.8
-"""Shares of a lesson until which the teacher acts in all worlds, and from which in none that starts."""
+"""Shares of the imitation phase until which the expert acts in all worlds, and from which in none that starts."""
 _IMITATION_NOISE, _IMITATION_RATE = 0.2, (2e-3, 3e-4)
-"""Noise of actions, and learning rates at the start and at the end of a lesson."""
+"""Action noise, and learning rates at the start and at the end of the imitation phase."""
 _LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safetensors", "random.json"
 
 
 def train(
     output: UserPath, training: Training | None = None, *, say: Say = quiet, stop: Stop = lambda: False
 ) -> Iterator[Record]:
-    """Train to the end of the budget; a record for each iteration.
+    """Train until the budget is spent; yields a record after each iteration.
 
-    Closing the iterator, an interrupt or a kill leaves the last checkpoint, from which ``resume`` gives what would have
-    come without the break: with a budget of ``steps`` bit for bit. Torch computes on one thread, and between iterations
-    its global settings are those of the caller.
+    Closing the iterator, an interrupt or a kill leaves the last checkpoint, from which ``resume`` continues as if there
+    had been no break; with a budget of ``steps`` bit for bit. Torch runs on one thread; its global settings are
+    restored between iterations.
 
     Args:
         output: a new or empty folder.
-        training: what is trained, and how; all defaults if None.
-        say: told on what is trained.
-        stop: asked after every iteration; where it says so, the training ends with a checkpoint.
+        training: its description; all defaults if None.
+        say: called with messages about the training.
+        stop: called after every iteration; once it returns True, the training ends with a checkpoint.
 
     Raises:
-        ResultsError: the folder is used, by another process too, or can't be written; the last checkpoint is whole.
-        RewardError: the reward can't be imported, or gives what is no reward.
-        TrainingError: the teacher can't teach on a scenario.
+        ResultsError: the folder is in use or can't be written; the last checkpoint stays complete.
+        RewardError: the reward can't be imported, or returns an invalid value.
+        TrainingError: the expert can't run on a scenario.
     """
     with opened(user_path(output), training or Training(), say) as folder:
         yield from _run(folder, folder.until, say, stop)
@@ -69,27 +69,27 @@ def train(
 def resume(
     output: UserPath, until: float | None = None, *, say: Say = quiet, stop: Stop = lambda: False
 ) -> Iterator[Record]:
-    """Go on with a training; a record for each iteration.
+    """Continue a training; yields a record after each iteration.
 
     Args:
         output: the folder of the training.
-        until: its budget in all, agent-steps or seconds, that before included; as before if None. Beyond the first
-            budget noise, rate and the cost of contacts stay as they were at its end.
-        say: told from where it goes on.
+        until: the new total budget, agent-steps or seconds; unchanged if None. Beyond the first budget, noise,
+            learning rate and collision cost keep their final values.
+        say: called with where the training resumes.
         stop: as for ``train``.
 
     Raises:
-        ResultsError: the folder holds no training, or a damaged one, or is in use; the message names the file.
+        ResultsError: the folder holds no training or a damaged one, or is in use; the message names the file.
         TrainingError: ``until`` is not above 0 and finite.
     """
     if until is not None and not 0.0 < until < math.inf:
-        raise TrainingError(f"until must be above 0 and finite, got {until}; leave it out to go on to the budget")
+        raise TrainingError(f"until must be above 0 and finite, got {until}; leave it out to keep the budget")
     with opened(user_path(output), None, say) as folder:
         yield from _run(folder, until or folder.until, say, stop)
 
 
 def _run(folder: TrainingFolder, until: float, say: Say, stop: Stop) -> Iterator[Record]:
-    """Iterations from where the folder stands, with a checkpoint now and then and at the end."""
+    """Iterations from the folder's last checkpoint on, with further checkpoints."""
     training, record, stopped = folder.training, folder.record, False
     if record.spent(training) >= until:
         return
@@ -119,16 +119,16 @@ def _run(folder: TrainingFolder, until: float, say: Say, stop: Stop) -> Iterator
 
 
 def _due(record: Record, training: Training) -> int:
-    """How many validations are due by now."""
+    """Number of validations that are due so far."""
     return int(record.spent(training) * training.validations / training.budget)
 
 
 class Trainer:
-    """A learner with its rows, and how they are kept on disk.
+    """A learner with its rows, and their checkpoints.
 
     Args:
-        training: what is trained, and how.
-        checkpoint: where to go on, see ``restore``; else the training begins.
+        training: its description.
+        checkpoint: folder to restore; None to start.
     """
 
     def __init__(self, training: Training, checkpoint: Path | None = None) -> None:
@@ -169,7 +169,7 @@ class Trainer:
         )
 
     def save(self, folder: Path, record: Record) -> None:
-        """All that ``restore`` needs, and the policy."""
+        """Write the state for ``restore``, and the policy."""
         folder.mkdir(parents=True, exist_ok=True)
         self.save_policy(folder, record)
         (folder / _LEARNER_FILE).write_bytes(safetensors.numpy.save(self.learner.arrays()))
@@ -178,7 +178,7 @@ class Trainer:
         (folder / _RANDOM_FILE).write_text(random + "\n", encoding="utf-8")
 
     def save_policy(self, folder: Path, record: Record, validation: Validation | None = None) -> None:
-        """The policy, with what is known of it."""
+        """Write the policy with the training's settings, versions and record."""
         settings = {**self.training.model_dump(mode="json"), "versions": versions(), "record": record._asdict()}
         if validation is not None:
             settings["worst"] = validation.worst
@@ -186,7 +186,7 @@ class Trainer:
         save_checkpoint(folder / WEIGHTS_FILE, card, self.learner.weights)
 
     def restore(self, folder: Path) -> None:
-        """Go on from what ``save`` wrote, as if there had been no break. Raises ResultsError naming a damaged file."""
+        """Restore exactly what ``save`` wrote. Raises ResultsError that names a damaged file."""
         with _reading(folder / _LEARNER_FILE) as data:
             self.learner.restore(_learned(data))
         with _reading(folder / _WORLDS_FILE) as data:
@@ -202,12 +202,12 @@ _TORCH: Sequence[tuple[Callable[[], Any], Callable[[Any], object], Any]] = (
     (lambda: torch.backends.mkldnn.enabled, lambda on: setattr(torch.backends.mkldnn, "enabled", on), False),
     (lambda: sys.float_info.min / 2.0 == 0.0, torch.set_flush_denormal, False),
 )
-"""How each global setting of torch that changes numbers is read and set, and its value in a training."""
+"""Global settings of torch that change numbers: how each is read and set, and its value in a training."""
 
 
 @contextmanager
 def fixed_torch() -> Iterator[None]:
-    """Torch computes in this block in float32 on one thread of the CPU with gradients, whatever was set before."""
+    """Run torch in float32 on one CPU thread with gradients, whatever the global settings are."""
     with ExitStack() as stack:
         for get, put, value in _TORCH:
             stack.callback(put, get())
@@ -219,7 +219,7 @@ def fixed_torch() -> Iterator[None]:
 
 
 def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
-    """The record with a validation of the policy as it stands, which becomes ``best`` where none was better."""
+    """Validate the present policy, and keep it as ``best`` unless an earlier one was better; the record."""
     candidate, best = output / "candidate", output / "best"
     trainer.save_policy(candidate, record)
     validation = validate(str(candidate), trainer.training)
@@ -235,7 +235,7 @@ def _validated(trainer: Trainer, record: Record, output: Path) -> Record:
 
 
 def best_of(output: Path) -> tuple[Record, str]:
-    """Of a training's best policy: its iteration, and the command that shows the worst episode in its validation."""
+    """The record of a training's best policy, and the command that shows the worst episode of its validation."""
     training = dict(load_checkpoint(output / "best").card.training)
     fields = {name: value for name, value in training.items() if name in Training.model_fields}
     return Record(**training["record"]), replay_command(output / "best", Training(**fields), Worst(*training["worst"]))
@@ -243,14 +243,14 @@ def best_of(output: Path) -> tuple[Record, str]:
 
 @contextmanager
 def _reading(path: Path) -> Iterator[bytes]:
-    """Turn whatever data from outside can cause into one message that names the file."""
+    """Turn any error caused by a file's content into a ResultsError that names the file."""
     try:
         yield path.read_bytes()
     except Exception as error:
         reason = " ".join(str(error).split())
         raise ResultsError(
-            f"{path} can't be used ({type(error).__name__}: {reason}); copy the checkpoint again as a whole, or begin "
-            "anew with another --output"
+            f"{path} can't be used ({type(error).__name__}: {reason}); copy the whole checkpoint again, or "
+            "start again with another --output"
         ) from error
 
 

@@ -1,7 +1,7 @@
-"""``Training``: all that a training is. Its TOML is a recipe, and ``config.json`` of a run repeats it."""
+"""``Training``: the description of a training, read from a TOML recipe and saved in a run's ``config.json``."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, Any, Literal, NamedTuple, Self, cast
 
@@ -11,24 +11,24 @@ from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import Card, card_of
 from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.baselines.making import check_base_controller
-from uuv_marl.baselines.policy import Policy
-from uuv_marl.baselines.requirements import inner_loop_nms
+from uuv_marl.baselines.requirements import FULL_TORQUE_NM, inner_loop_nms
 from uuv_marl.envs.changes import Reward
 from uuv_marl.envs.core import refuse_losses
-from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError, hint
+from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
 from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario.messages import explain
 from uuv_marl.scenario.overrides import assign, plain
 
 _PERIOD, _LOOP, _LOOP_NMS = "timing.decision_period_s", "actuators.yaw_damping_nms", 600.0
 OVERRIDES: Mapping[str, object] = {_PERIOD: 0.5, _LOOP: _LOOP_NMS}
-"""What training changes in a scenario that fixes neither (``timing.fixed``), with the paper's vehicle: a fifth of the
-decisions, and an inner loop, so that noise on the torque does not spin a vehicle."""
-CONTACT_COST = (1.0, 300.0)
-"""What contacts cost beyond the rewards of the package's tasks: little at first, so that vehicles learn where to go."""
+"""Changes to a scenario without ``timing.fixed``, for the paper's vehicle: a fifth of the decisions, and a yaw damping,
+so that action noise does not spin the vehicle."""
+COLLISION_COST = (1.0, 300.0)
+"""Cost of a collision beyond the rewards of the package's tasks: small at first, so that vehicles learn to move."""
 ROWS = 640
-"""Vehicles at once, about."""
+"""Approximate number of vehicles that are simulated together."""
 
 Count = Annotated[int, pydantic.Field(ge=1)]
 Whole = Annotated[int, pydantic.Field(ge=0)]
@@ -43,129 +43,130 @@ def _paired(sizes: Any) -> Any:
 
 
 class Part(NamedTuple):
-    """What of a training is stepped together."""
+    """Worlds of a training that are stepped together."""
 
     name: str
-    """The scenario's, or its file."""
+    """Name or file of the scenario."""
     scenario: Scenario
     """With its number of vehicles."""
     worlds: int
 
     @property
     def vehicles(self) -> int:
-        """Of each world."""
+        """Number of vehicles in each world."""
         return self.scenario.swarm.num_vehicles
 
 
 class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """Numbers of the algorithm, see ``uuv_marl.train.ppo``."""
+    """Hyperparameters of ``uuv_marl.train.ppo``."""
 
     gamma: Share = 0.99
     """Discount per decision; with 0.5 s rewards fade over 50 s."""
     gae_lambda: Share = 0.95
     """Weight of longer returns in advantages [1]."""
     horizon: Count = 64
-    """Decisions between updates; a memory is trained through so many."""
+    """Decisions between updates, and length of backpropagation through time."""
     minibatches: Count = 10
-    """Gradient steps of an epoch, at most; with a memory each is on the whole horizon of a part of the vehicles."""
+    """Gradient steps of an epoch, at most."""
     epochs: Count = 4
     """Passes over a batch, at most."""
     clip: Positive = 0.2
     """Clip range of PPO's ratio [1]."""
     kl_stop: Positive = 0.03
-    """No further epoch where one has diverged further from the policy that sampled."""
+    """Divergence from the policy that sampled, beyond which no further epoch runs."""
     learning_rate: tuple[Positive, Positive] = (1e-3, 1e-4)
     """At the start and at the end."""
     noise: tuple[Positive, Positive] = (0.5, 0.1)
-    """Standard deviation of actions [1], at the start and at the end. Noise is clipped at full force, and a policy that
-    learned to make up for that overshoots without it: end with little."""
+    """Standard deviation of actions [1], at the start and at the end. Actions are clipped at full force, and a policy
+    that learns to compensate for this overshoots without noise: end with a small value."""
     collision_cost: tuple[NotNegative, NotNegative] | None = None
-    """What a contact that begins costs beyond the reward, at the start and at the end, in equal ratios, or evenly from
-    or to 0. If None: ``CONTACT_COST`` with the package's tasks and their rewards; nothing with one of your own."""
+    """Cost of a collision beyond the reward, at the start and at the end, see ``annealed``. If None: ``COLLISION_COST``
+    with the package's tasks and rewards; 0 with a task or reward of your own."""
     max_gradient: Positive = 0.5
-    """Norm to which gradients of actor and critic are clipped."""
+    """Norm to which the gradients of actor and critic are clipped."""
     value_decay: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.99
-    """Decay of the running mean and variance by which returns are normalised [1]."""
+    """Decay of the running mean and variance that normalise returns [1]."""
 
 
 class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """A training, field by field.
+    """Description of a training.
 
     Raises:
-        TrainingError: a field is unknown or can't be used; the message names it, its value and the remedy.
-        ScenarioError: the scenario can't be used.
-        PolicyError: there is no law ``around``.
+        TrainingError: a field is unknown or invalid; the message names it, its value and the remedy.
+        ScenarioError: the scenario is invalid.
+        PolicyError: there is no such base controller.
     """
 
     title: str = ""
-    """What it is for, in words."""
+    """Text above ``curve.png``; if empty, the scenario's title."""
     scenario: str = "starter"
     """Name or TOML file."""
     extra_scenarios: tuple[str, ...] = ()
-    """Further scenarios for the same network, with the same observation, vehicle and clock; to equal parts."""
+    """Further scenarios for the same network, in equal parts, with the same observation, vehicle and clock."""
     overrides: dict[str, Any] = {}
-    """Fields of ``scenario`` that differ from its file; ``OVERRIDES`` are added where they are not here."""
+    """Changed fields of ``scenario``; ``OVERRIDES`` apply to fields that are not given."""
     sizes: Annotated[tuple[tuple[Count, Whole], ...], pydantic.BeforeValidator(_paired)] = ()
-    """Vehicles and worlds of each swarm, or vehicles alone. If empty: the scenario's own. Without worlds, or with 0,
-    about as many vehicles of each size, ``ROWS`` in all."""
+    """Pairs of numbers of vehicles and worlds, or numbers of vehicles; the scenario's own if empty. Without a number of
+    worlds, or with 0, each size gets about the same number of vehicles, ``ROWS`` in total."""
     reward: str | None = None
-    """One of the task's rewards, ``team``, or ``module:function`` of one's own: from the swarm after a decision to an
-    array (world, vehicle). If None: the task's first."""
+    """One of the task's rewards, ``team``, or your own ``module:function`` from the swarm after a decision to an array
+    (world, vehicle). If None: the task's first."""
     critic: Literal["state", "own"] = "state"
-    """What the critic sees beside the vehicle's observation: ``state``, the truth about the world (MAPPO); ``own``,
+    """Input of the critic beyond the vehicle's observation: ``state``, the true state of the world (MAPPO); ``own``,
     nothing (IPPO)."""
     network: Architecture = Architecture()
-    """What the policy's network is made of."""
+    """Architecture of the policy's network."""
     filter: bool = False
-    """Whether actions pass the safety filter, in training as in use."""
+    """Whether actions pass the safety filter, in training and in use."""
     base_controller: str = ""
-    """Name of a law to whose actions the network's are added, at half the force; none if empty."""
+    """Name of a controller to whose actions the network's are added, at half the force; none if empty."""
     expert: str = ""
-    """Name of a policy that the network imitates before it learns from its reward; none if empty. At first the teacher
-    acts, then the network more and more, always told what the teacher would do (as in DAgger, Ross et al. 2011)."""
+    """Name of a policy that the network imitates before it learns from its reward; none if empty. The network gradually
+    takes over the acting, with the expert's actions as targets (as in DAgger, Ross et al. 2011)."""
     imitation_share: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.4
-    """How much of the budget it imitates, if there is a teacher; ``ppo`` begins after it."""
+    """Share of the budget for imitation, if there is an expert; PPO starts after it."""
     imitation_weight: NotNegative = 0.0
-    """Weight in PPO's loss, after the lesson, of the mean squared distance from what the teacher would do [1]."""
+    """Weight in PPO's loss of the mean squared distance from the expert's actions [1]."""
     ppo: Ppo = Ppo()
-    """Numbers of the algorithm."""
+    """Hyperparameters of PPO."""
     minutes: Positive | None = None
-    """Processor time, validations apart; 5 if neither this nor ``steps`` is given. Annealing ends with it."""
+    """Budget of processor time without validations; 5 if neither this nor ``steps`` is given."""
     steps: Count | None = None
-    """Agent-steps: one is one decision of one vehicle. Unlike time they give the same training on every machine."""
+    """Budget of agent-steps (decisions of one vehicle), which gives the same training on every run."""
     seed: int = pydantic.Field(0, ge=0)
-    """Of weights, worlds and noise: it fixes a training that has ``steps``."""
+    """Seed of weights, worlds and noise; determines a training that has ``steps``."""
     validations: Count = 15
-    """How often the policy is validated, in even parts of the budget."""
+    """Number of validations, at equal parts of the budget."""
     validation_episodes: Count = 16
-    """Episodes of a validation, of all sizes together."""
+    """Episodes of a validation, over all sizes."""
     checkpoint_every: Count = 20
-    """Iterations."""
+    """Iterations between checkpoints."""
 
     def __init__(self, **fields: Any) -> None:
         try:
             super().__init__(**plain(fields))
         except pydantic.ValidationError as error:
-            raise _explained(error) from None
+            cause = error.errors()[0].get("ctx", {}).get("error")
+            known = isinstance(cause, ScenarioError | TrainingError | PolicyError)
+            raise (cause if known else TrainingError(explain(error, fields, type(self)))) from None
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Self:
-        """Fill in what is left out, and refuse what can't be run."""
+        """Fill in defaults that depend on other fields, and check the combination of fields."""
         if self.expert and self.base_controller:
             raise TrainingError(
                 f"expert {self.expert!r} and base_controller {self.base_controller!r} are both given; leave one out"
             )
         if self.imitation_weight and not self.expert:
-            raise TrainingError(
-                f"imitation_weight = {self.imitation_weight:g} needs an expert, and none is given; name one, or leave it out"
-            )
+            weight = f"imitation_weight = {self.imitation_weight:g}"
+            raise TrainingError(f"{weight} needs an expert, and none is given; name one, or leave it out")
         if self.minutes is not None and self.steps is not None:
             raise TrainingError(f"minutes = {self.minutes:g} and steps = {self.steps} are both given; leave one out")
         if self.minutes is None and self.steps is None:
             object.__setattr__(self, "minutes", 5.0)
         if self.ppo.collision_cost is None:
             own = ":" in "".join([self.reward or "", *(each.task.name for each in self._scenarios.values())])
-            ppo = self.ppo.model_copy(update={"collision_cost": (0.0, 0.0) if own else CONTACT_COST})
+            ppo = self.ppo.model_copy(update={"collision_cost": (0.0, 0.0) if own else COLLISION_COST})
             object.__setattr__(self, "ppo", ppo)
         for name, scenario in self._scenarios.items():
             refuse_losses(scenario, "training")
@@ -178,8 +179,8 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
             card = self._card(scenario)
             if differs := next((f for f in Card.model_fields if getattr(card, f) != getattr(self.card, f)), None):
                 raise TrainingError(
-                    f"also = {name!r} has another {differs} than {self.scenario!r}, and one network can't have both; "
-                    "leave it out, or make them alike in a file of your own"
+                    f"extra_scenarios has {name!r} with another {differs} than {self.scenario!r}, and one network "
+                    "needs the same; leave it out, or make them equal in a file of your own"
                 )
         return self
 
@@ -208,7 +209,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
-        """All swarms that are stepped at once: of each scenario its sizes."""
+        """All groups of worlds: each scenario with each size."""
         parts: list[Part] = []
         for name, scenario in self._scenarios.items():
             sizes = self.sizes or ((scenario.swarm.num_vehicles, 0),)
@@ -219,14 +220,14 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
 
     @cached_property
     def card(self) -> Card:
-        """What a checkpoint says of its policy."""
+        """Card of the policy's checkpoint."""
         return self._card(self.loaded)
 
     def _card(self, scenario: Scenario) -> Card:
         return card_of(scenario, network=self.network, filter=self.filter, base_controller=self.base_controller)
 
     def reward_for(self, scenario: Scenario) -> Reward:
-        """What vehicles are paid for a decision. Raises RewardError where it can't be imported."""
+        """The reward on a scenario. Raises RewardError where it can't be imported."""
         name = self.reward or next(iter(scenario.task_class.rewards))
         if ":" not in name:
             return cast(Reward, name)
@@ -240,25 +241,25 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
 
 
 def overrides_for(scenario: str, own: Mapping[str, object]) -> dict[str, object]:
-    """What training changes in a scenario: ``OVERRIDES``, with the inner loop of its vehicle, and fields of one's own.
+    """Fields that training changes in a scenario: ``OVERRIDES``, scaled to its vehicle, and the given ones.
 
     Args:
         scenario: name or TOML file.
-        own: go before the others; they may name another vehicle.
+        own: given fields, which take precedence and may name another vehicle.
 
     Raises:
         ScenarioError: the scenario can't be loaded with them.
     """
-    # With a hold of one's own the scenario's decision period may be no multiple of it; the training's takes its place.
+    # The scenario's decision period need not be a multiple of a given control step; the training's replaces it.
     clock = OVERRIDES if "timing.control_step_s" in own else {}
     bare = load_scenario(scenario, overrides={**clock, **own, _LOOP: own.get(_LOOP, 0.0)})
     if bare.timing.fixed:
         return dict(own)
-    return {**OVERRIDES, _LOOP: inner_loop_nms(_LOOP_NMS, Policy.full_torque_nm, bare), **own}
+    return {**OVERRIDES, _LOOP: inner_loop_nms(_LOOP_NMS, FULL_TORQUE_NM, bare), **own}
 
 
 def recipe_fields(name: str) -> dict[str, Any]:
-    """Fields of a training by the name of a scenario, or from a TOML file: a scenario's, or a recipe with such fields.
+    """Fields of a training, from the name of a scenario, or from the TOML file of a scenario or recipe.
 
     A recipe names its ``scenario``; no scenario's file does.
 
@@ -274,22 +275,20 @@ def recipe_fields(name: str) -> dict[str, Any]:
             f"{name} can't be read ({error.strerror}); give a scenario's name, or a TOML file of a scenario or training"
         ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise TrainingError(f"{name} is no TOML ({error}); mend it there") from None
+        raise TrainingError(f"{name} is not valid TOML ({error}); correct it there") from None
     return fields if "scenario" in fields else {"scenario": name}
 
 
-TABLES: Mapping[str, Sequence[str]] = {
-    "": [*Training.model_fields], "ppo": [*Ppo.model_fields], "network": [*Architecture.model_fields],
-}  # fmt: skip
-"""Names of all fields, by table."""
+TABLES = ("ppo", "network")
+"""Fields that are tables."""
 
 
 def changed_fields(fields: dict[str, Any], changes: Mapping[str, object]) -> dict[str, Any]:
-    """Fields of a training with others in their place: its own, or fields of the scenario, which become ``overrides``.
+    """Fields of a training with changes, of which fields of the scenario become ``overrides``.
 
     Args:
-        told: of a recipe; changed in place.
-        changes: by field, with dots as in ``ppo.gamma``.
+        fields: of a recipe; changed in place.
+        changes: values by field, with dots as in ``ppo.gamma``.
     """
     for field, value in changes.items():
         table, dot, _ = field.partition(".")
@@ -298,18 +297,3 @@ def changed_fields(fields: dict[str, Any], changes: Mapping[str, object]) -> dic
         else:
             fields.setdefault("overrides", {})[field] = value
     return fields
-
-
-def _explained(error: pydantic.ValidationError) -> Exception:
-    """What is wrong first, as an error of ours."""
-    first = error.errors()[0]
-    if first["type"] == "value_error" and "ctx" in first:
-        cause = first["ctx"]["error"]
-        return cause if isinstance(cause, ScenarioError | TrainingError | PolicyError) else TrainingError(str(cause))
-    *place, last = map(str, first["loc"])
-    field = ".".join([*place, last])
-    if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        names = TABLES.get(".".join(place), ())
-        remedy = hint(last, names, 0.6) or f"the fields here are {', '.join(names)}"
-        return TrainingError(f"{field} is unknown; {remedy.strip()}")
-    return TrainingError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}")

@@ -1,4 +1,4 @@
-"""How good a policy is: deterministic episodes on validation seeds, through the benchmark's own ``evaluate``."""
+"""Validation of a policy: deterministic episodes on validation seeds, run by the benchmark."""
 
 import json
 import shlex
@@ -15,7 +15,7 @@ from uuv_marl.train.rows import TRAINING_SEEDS
 from uuv_marl.train.training import Part, Training, overrides_for
 
 VALIDATION_SEEDS = TRAINING_SEEDS[1]
-"""The first of the validation seeds: up to 999,999, which no training uses."""
+"""First validation seed; training uses none from here to 999,999."""
 _EVERY_POLICYS_OWN = ("sonar.channels", "actuators.yaw_damping_nms")
 
 
@@ -28,27 +28,27 @@ class Worst(NamedTuple):
 
 
 class Validation(NamedTuple):
-    """Episodes of a validation."""
+    """Results of a validation."""
 
     swarm_success: float
-    """Share of episodes in which all vehicles did their task, and nobody touched anything (``Task.metrics``)."""
+    """Share of episodes in which all vehicles succeed without a collision (``Task.metrics``)."""
     share: float
-    """The task's headline, such as the share of vehicles that did theirs untouched; in ``follow`` that of swarms."""
+    """Mean headline of the task, such as the share of vehicles that succeed; in ``follow`` ``swarm_success``."""
     collisions: float
-    """That began, mean over episodes."""
+    """Mean number of collisions of an episode."""
     time_s: float | None
-    """Mean over whole episodes, of the time until the task was done."""
+    """Mean time to complete the task over successful episodes [s]; None without any."""
     worst: Worst
-    """Of the fewest vehicles that did their task, then of the most contacts."""
+    """The episode with the lowest headline, then with the most collisions."""
 
     @property
     def score(self) -> float:
-        """By which policies are chosen [1]: the mean of both shares."""
+        """Mean of both shares, by which the best policy is chosen [1]."""
         return (self.swarm_success + self.share) / 2.0
 
 
 def validate(policy: str, training: Training) -> Validation:
-    """Run a policy, by its name or path, on a training's validation seeds, with each scenario and size of swarm."""
+    """Run a policy, by its name or path, on the validation seeds with each scenario and size of a training."""
     number = max(1, training.validation_episodes // len(training.parts))
     seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + number)
     runs = [(part, run) for part in training.parts for run in _runs(policy, part, seeds)]
@@ -73,13 +73,13 @@ def _runs(policy: str, part: Part, seeds: Sequence[int]) -> Iterator[Run]:
 
 
 def _end_s(run: Run) -> float:
-    """When an episode's task was done, if it was."""
+    """Time at which a successful episode completed its task [s]."""
     arrived = run.metrics["task_time_s"]
     return float(run.routes.time_s[-1]) if arrived is None else arrived
 
 
 def shares_of(metrics: Metrics, headline: str) -> tuple[float, bool]:
-    """An episode's headline, and whether the swarm was whole; in ``follow`` whether it came and touched nothing."""
+    """An episode's headline, and swarm success; in ``follow`` arrival without a collision."""
     own = metrics.get("task", {})
     if "swarm_success" not in own:
         swarm_success = metrics["task_time_s"] is not None and not metrics["collisions"]

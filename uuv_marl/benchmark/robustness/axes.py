@@ -1,4 +1,4 @@
-"""The axes: each disturbance, its severity at each level, and the changed scenario. Numbers are in ``axes.toml``."""
+"""The axes: disturbances with the severity and the changed fields at each level, read from ``axes.toml``."""
 
 import math
 import tomllib
@@ -15,11 +15,11 @@ GROUPS = {
     "X": "combined",
 }  # fmt: skip
 CALM = "0"
-"""Stands for an axis where nothing is wrong: level 0 of all of them."""
+"""Name of the axis without a disturbance: level 0 of all axes."""
 
 
 class Axis(NamedTuple):
-    """One thing that goes wrong; all sequences run over level 0 and then ``levels``."""
+    """One disturbance; all sequences have an entry for level 0 and for each of ``levels``."""
 
     name: str
     title: str
@@ -28,23 +28,23 @@ class Axis(NamedTuple):
     source: str
     levels: tuple[int, ...]
     severity: tuple[float, ...]
-    """Severity of each level in the unit; inf or NaN where that can't be said in a number."""
+    """Severity of each level in the unit; inf or NaN where it is not a number."""
     labels: tuple[str, ...]
     channels: frozenset[str]
-    """Only policies that use one of these are run; empty for all."""
+    """Channels of which a policy must use one to be run; empty for all policies."""
     changes: tuple[dict[str, Any], ...]
     """Fields of the scenario at each of ``levels``."""
     of_speed: frozenset[str]
-    """Fields that are shares of the speed of l(t)."""
+    """Fields given as shares of the speed of l(t)."""
 
     def overrides(self, level: int, speed_mps: float) -> dict[str, object]:
-        """Fields of a scenario in which l(t) moves at this speed [m/s]; ``level`` is one of mine."""
+        """Changed fields of a scenario at one of ``levels``, for this speed of l(t) [m/s]."""
         changes = self.changes[self.levels.index(level)]
         return {f: speed_mps * v if f in self.of_speed else v for f, v in changes.items()}
 
     def concerns(self, policy: str) -> bool:
-        """Whether the policy uses what goes wrong here."""
-        return not self.channels or not self.channels.isdisjoint(policy_class(policy).channels)
+        """Whether the policy uses the disturbed channels."""
+        return not self.channels or not self.channels.isdisjoint(policy_class(policy).requirements.channels)
 
 
 def _axis(name: str, data: dict[str, Any]) -> Axis:
@@ -64,19 +64,19 @@ def _axis(name: str, data: dict[str, Any]) -> Axis:
 
 _DATA = tomllib.loads((resources.files("uuv_marl.benchmark.robustness") / "axes.toml").read_text(encoding="utf-8"))
 BASE: dict[str, Any] = _DATA["base"]
-"""Fields of every scenario of the suite, at level 0 too."""
+"""Changed fields of every scenario of the suite, also at level 0."""
 AXES = {name: _axis(name, data) for name, data in _DATA["axes"].items()}
 """All axes by name, in the order of the report."""
 
 
 def overrides(axis: str, level: int, scenario: str) -> dict[str, object]:
-    """The fields of a scenario that a cell of the suite changes."""
+    """Changed fields of a scenario in a cell of the suite."""
     speed_mps = load_scenario(scenario).trajectory.speed_mps
     return BASE | ({} if axis == CALM else AXES[axis].overrides(level, speed_mps))
 
 
 def known(names: Sequence[str]) -> list[str]:
-    """These axes, in the report's order; raises ResultsError where there is no such axis."""
+    """These axes in the report's order. Raises ResultsError for an unknown name."""
     for name in names:
         if name not in AXES:
             raise ResultsError(f"there is no axis {name!r}; there are {', '.join(AXES)}")

@@ -1,4 +1,4 @@
-"""A scenario's picture: success over severity, a panel for every axis, a line for every policy."""
+"""Picture of a scenario: success over severity, a panel for every axis, a line for every policy."""
 
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
@@ -16,13 +16,13 @@ with pictures():
     from matplotlib.figure import Figure
 
 _AGAIN = ((".", "-"), ("x", "--"), ("^", ":"))
-"""Marker and line of the policies that come first, and of those for which no new colour is left."""
+"""Marker and line of the first policies, and of those that reuse their colours."""
 _CROWD = 5
-"""Of more lines than this a panel shows no intervals."""
+"""Largest number of lines in a panel with intervals."""
 
 
 def draw(table: Any) -> Figure:
-    """The picture of one scenario's rows of ``scores.by_seed``."""
+    """Draw one scenario's rows of ``scores.by_seed``."""
     axes = [axis for name, axis in AXES.items() if name in table]
     policies: list[str] = list(table.index.unique("policy"))
     looks = dict(zip(policies, itertools.product(_AGAIN * len(policies), COLOURS), strict=False))
@@ -47,7 +47,7 @@ def draw(table: Any) -> Figure:
 
 
 def _draw_line(ax: Axes, axis: Axis, own: Any, intervals: bool, **style: Any) -> None:
-    """A policy: success at every level that was run, and perhaps its intervals."""
+    """Draw a policy's success at every level that was run, with intervals if asked."""
     if axis.name not in own or CALM not in own:
         return
     cells = own[[CALM, axis.name]].dropna(axis="columns", how="all")

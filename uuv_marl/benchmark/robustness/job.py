@@ -1,4 +1,4 @@
-"""The suite as a job: its cells as cases, their missing runs, and all episodes as one table."""
+"""Run what is missing of the suite, and write all episodes as one table."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -8,6 +8,7 @@ from uuv_marl.atomic import replacing
 from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.benchmark.frame import import_pandas
 from uuv_marl.benchmark.robustness.axes import AXES, CALM, overrides
+from uuv_marl.benchmark.runner import distinct_names
 from uuv_marl.benchmark.suite import Case, Report, Suite
 from uuv_marl.scenario import ScenarioError, load_scenario
 from uuv_marl.tasks import Follow
@@ -17,7 +18,7 @@ METRICS = (
     "success_share", "safe_share", "done_share", "swarm_success", "vehicles_faulty", "collisions",
     "min_obstacle_distance_m", "min_spacing_m", "centre_error_m", "task_time_s", "effort",
 )  # fmt: skip
-"""What is kept of an episode; docs/benchmark.md defines them."""
+"""Metrics of an episode that are kept; docs/benchmark.md defines them."""
 DIGITS = ".6g"
 
 
@@ -26,7 +27,7 @@ class Plan(NamedTuple):
 
     axes: Sequence[str]
     levels: Sequence[int]
-    """Levels to run beside level 0."""
+    """Levels to run besides level 0."""
     scenarios: Sequence[str]
     policies: Sequence[str]
     seeds: int
@@ -79,8 +80,7 @@ def _places(plan: Plan) -> Iterator[tuple[str, int]]:
 def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> Path:
     """Run what is missing of a plan, and write all its episodes to ``EPISODES``, a row each; the file.
 
-    The folder holds a benchmark's results of each scenario, axis and level, in ``cells``. The rest is as for
-    ``Suite.run``.
+    The folder ``cells`` holds a benchmark's results of each scenario, axis and level; see also ``Suite.run``.
 
     Raises:
         PolicyError: a policy does not exist, or cannot be run on one of the scenarios.
@@ -88,9 +88,7 @@ def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> P
         ResultsError: the folder holds other results.
     """
     scenarios = [load_scenario(scenario) for scenario in plan.scenarios]
-    names = [scenario.name for scenario in scenarios]
-    if len(set(names)) < len(names):
-        raise ScenarioError(f"scenarios of one report need different names, got {', '.join(names)}; rename a file")
+    distinct_names(scenarios, "report")
     for scenario in scenarios:
         if not issubclass(scenario.task_class, Follow):
             raise ScenarioError(
@@ -105,7 +103,7 @@ def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> P
     for cell in planned:
         make_policy(
             cell.case.policy, with_policy_requirements(cell.case.policy, cell.case.load())
-        )  # refused now, not after hours
+        )  # raises now, not after hours
     suite = Suite(folder / "cells", traces=False)
     suite.run([cell.case for cell in planned], report, restart=restart)
     path = folder / EPISODES
@@ -122,12 +120,12 @@ def _rows(suite: Suite, cell: Cell) -> Iterator[dict[str, Any]]:
 
 
 def write_episodes(path: Path, rows: Iterator[dict[str, Any]]) -> None:
-    """Rows of scenario, axis, level, policy, seed and metrics as CSV, six significant digits, NaN as nothing."""
+    """Write rows of scenario, axis, level, policy, seed and metrics as CSV, with six significant digits."""
     pandas = import_pandas("uuv-marl robustness")
     with replacing(path) as partial:
         pandas.DataFrame.from_records(list(rows)).to_csv(partial, index=False, float_format=f"%{DIGITS}")
 
 
 def read_episodes(path: Path) -> Any:
-    """What ``write_episodes`` wrote, as a pandas data frame."""
+    """Read the file of ``write_episodes`` as a pandas data frame."""
     return import_pandas("uuv-marl robustness").read_csv(path, dtype={"axis": str, "policy": str, "scenario": str})

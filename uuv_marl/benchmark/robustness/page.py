@@ -88,4 +88,4 @@ def _axes(table: Any) -> str:
 def _successes(policies: dict[str, Any], axis: str) -> Iterator[str]:
     for own in policies.values():
         score = axis_score(own, axis)
-        yield f"{score.success.value:.2f}" if score else _NOTHING
+        yield f"{score.value:.2f}" if score else _NOTHING
