@@ -97,7 +97,8 @@ def test_bad_input_names_the_agent_and_the_remedy():
             call()
     env.reset(seed=0)
     good = dict.fromkeys(env.agents, np.zeros(2, np.float32))
-    for actions, message in (({"uuv_0": good["uuv_0"]}, "of uuv_1 is missing"), ({**good, "x": 0}, "agent 'x' is unknown")):
+    few, many = {"uuv_0": good["uuv_0"]}, {**good, "x": 0}
+    for actions, message in ((few, "of uuv_1 is missing"), (many, "agent 'x' is unknown")):
         with pytest.raises(ValueError, match=message):
             env.step(actions)
     for told, message in (
@@ -179,7 +180,8 @@ def test_a_seed_is_a_whole_number_everywhere(bad):
     scenario = load_scenario("single_obstacle", num_vehicles=2)
     one = np.ndim(bad) == 0 or not bad
     env = uuv_marl.parallel_env(scenario)
-    for reset in (env.reset, Swarm(scenario).reset, make_policy("random", scenario).reset, uuv_marl.vector_env(1).reset):
+    policy, vector = make_policy("random", scenario), uuv_marl.vector_env(1)
+    for reset in (env.reset, Swarm(scenario).reset, policy.reset, vector.reset):
         with pytest.raises(TypeError, match="seed must be a whole number from 0, got"):
             reset(seed=bad)
     if one:
