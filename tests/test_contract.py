@@ -41,7 +41,7 @@ def test_every_api_gives_the_same_run(case, api):
 @pytest.mark.needs("stable_baselines3")
 def test_sb3_gives_the_same_run_or_refuses_losses(case):
     if case.scenario == "lossy" or case.name in ("sinks", "sea-loses"):
-        with pytest.raises(ValueError, match="SwarmVecEnv can't show that a vehicle is lost"):
+        with pytest.raises(ValueError, match="SwarmVecEnv can't represent the loss of a vehicle"):
             contract.sb3(case)
     else:
         contract.sb3(case).equals(reference(case))

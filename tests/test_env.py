@@ -93,11 +93,12 @@ def test_observations_are_within_finite_bounds_and_lose_nothing():
 def test_bad_input_names_the_agent_and_the_remedy():
     env = uuv_marl.parallel_env(num_vehicles=3)
     for call in (env.state, uuv_marl.parallel_env(render_mode="rgb_array").render):
-        with pytest.raises(RuntimeError, match="came before reset"):
+        with pytest.raises(RuntimeError, match="was called before reset"):
             call()
     env.reset(seed=0)
     good = dict.fromkeys(env.agents, np.zeros(2, np.float32))
-    for actions, message in (({"uuv_0": good["uuv_0"]}, "of uuv_1 is missing"), ({**good, "x": 0}, "no agent 'x'")):
+    few, many = {"uuv_0": good["uuv_0"]}, {**good, "x": 0}
+    for actions, message in ((few, "of uuv_1 is missing"), (many, "agent 'x' is unknown")):
         with pytest.raises(ValueError, match=message):
             env.step(actions)
     for told, message in (
@@ -109,18 +110,18 @@ def test_bad_input_names_the_agent_and_the_remedy():
             uuv_marl.parallel_env(**told)
     lone = uuv_marl.parallel_env(num_vehicles=1, reward=lambda swarm: -swarm.facts.spacing)
     lone.reset(seed=0)
-    with pytest.raises(ValueError, match="must give finite numbers"):
+    with pytest.raises(ValueError, match="must hold finite numbers"):
         lone.step({"uuv_0": np.zeros(2)})
     huge = uuv_marl.parallel_env(num_vehicles=1, reward=lambda swarm: np.full(swarm.facts.spacing.shape, 1e300))
     huge.reset(seed=0)
-    with pytest.raises(ValueError, match=r"must give finite numbers, 1e\+09 at most"):
+    with pytest.raises(ValueError, match=r"must hold finite numbers of at most 1e\+09"):
         huge.step({"uuv_0": np.zeros(2)})
 
 
 def test_stepping_nobody_after_the_end_gives_nothing():
     """As PettingZoo's own environments do, and SuperSuit's black_death needs; but never before the first reset."""
     env = uuv_marl.parallel_env(num_vehicles=2, max_cycles=1)
-    with pytest.raises(RuntimeError, match="step came before reset; call reset"):
+    with pytest.raises(RuntimeError, match="step was called before reset; call reset"):
         env.step({})
     env.reset(seed=0)
     with pytest.raises(ValueError, match="the action of uuv_0 is missing"):
@@ -170,7 +171,7 @@ def test_what_is_no_action_is_refused_by_name(action, message):
         alone.step(action)
     with pytest.raises(TypeError, match="actions must be a dictionary"):
         env.step(np.zeros((3, 2)))
-    with pytest.raises(ValueError, match="there is no agent 5"):
+    with pytest.raises(ValueError, match="agent 5 is unknown"):
         env.step({**good, 5: np.zeros(2)})
 
 
@@ -179,7 +180,8 @@ def test_a_seed_is_a_whole_number_everywhere(bad):
     scenario = load_scenario("single_obstacle", num_vehicles=2)
     one = np.ndim(bad) == 0 or not bad
     env = uuv_marl.parallel_env(scenario)
-    for reset in (env.reset, Swarm(scenario).reset, make_policy("random", scenario).reset, uuv_marl.vector_env(1).reset):
+    policy, vector = make_policy("random", scenario), uuv_marl.vector_env(1)
+    for reset in (env.reset, Swarm(scenario).reset, policy.reset, vector.reset):
         with pytest.raises(TypeError, match="seed must be a whole number from 0, got"):
             reset(seed=bad)
     if one:

@@ -11,7 +11,7 @@ EXAMPLES = sorted((FOLDER / "extending").glob("*.py"))
 
 
 @pytest.mark.parametrize(("path", "says"), [
-    ("policy", "after 30 s the swarm is"), ("reward", "all vehicles together were paid"),
+    ("policy", "after 30 s the swarm is"), ("reward", "sum of all rewards"),
     ("task", "gathered"), ("vehicle", "slow: arrived after"), ("water", "m/s east: arrival"),
     ("sensor", "20 deg askew: arrived after"),
 ])  # fmt: skip

@@ -266,7 +266,7 @@ def test_closing_the_window_ends_no_run():
     env.reset(seed=0)
     actions = dict.fromkeys(env.agents, np.zeros(2))
     pygame.event.post(pygame.event.Event(pygame.QUIT))
-    with pytest.warns(UserWarning, match="the window was closed; the run goes on without it"):
+    with pytest.warns(UserWarning, match="the window was closed; the run continues without it"):
         env.step(actions)
     assert not pygame.display.get_init()
     env.step(actions)

@@ -202,11 +202,11 @@ def test_a_reset_or_a_refusal_leaves_no_action_behind():
     env.reset()
     env.step_async(np.ones((8, 2)))
     env.reset()
-    with pytest.raises(RuntimeError, match="step_wait came before step_async"):
+    with pytest.raises(RuntimeError, match="step_wait was called before step_async"):
         env.step_wait()
     with pytest.raises(ValueError, match="must be finite, got nan"):
         env.step(np.full((8, 2), np.nan))
-    with pytest.raises(RuntimeError, match="step_wait came before step_async"):
+    with pytest.raises(RuntimeError, match="step_wait was called before step_async"):
         env.step_wait()
     with pytest.raises(NotImplementedError, match="a reset has no options"):
         env.set_options({"a": 1})

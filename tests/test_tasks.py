@@ -61,7 +61,7 @@ def test_a_goal_at_rest_is_at_rest_where_others_pass_by():
 
 
 class Survive(Task):
-    """The scenario's own start; every vehicle is at its goal, nothing is rewarded, and the time limit ends an episode."""
+    """The scenario's own start; every vehicle is at its goal, and only the time limit ends an episode."""
 
     def draw(self, world, rng):
         return super().draw(world, rng)
@@ -230,7 +230,7 @@ def test_a_task_that_lacks_a_method_or_takes_a_name_twice_is_refused_by_it(monke
 
 
 @pytest.mark.parametrize(("own", "more", "message"), [
-    ({"min_spacing_m": 1.0, "success_share": 1.0, "swarm_success": 1.0}, {}, "can't give min_spacing_m in metrics: the name"),
+    ({"min_spacing_m": 1.0, "success_share": 1.0, "swarm_success": 1.0}, {}, "can't give min_spacing_m in metrics"),
     ({"mine_m": 1.0}, {}, "must give success_share, swarm_success in metrics; add to super"),
     ({"success_share": 1.0, "swarm_success": 1.0}, {"headline": "mine_share"}, "must give mine_share in metrics"),
 ])  # fmt: skip

@@ -633,7 +633,7 @@ def test_a_reward_of_ones_own_is_learned_from(tmp_path, no_validation, monkeypat
     monkeypatch.syspath_prepend(tmp_path)
     (record,) = train(tmp_path / "a", small(steps=1, reward="mine:still"))
     assert -6.0 < record.reward < 0.0
-    with pytest.raises(RewardError, match=r"must give an array \(2, 2\), got \(2,\)"):
+    with pytest.raises(RewardError, match=r"must have shape \(2, 2\) \(world, vehicle\), got \(2,\)"):
         list(train(tmp_path / "b", small(steps=1, sizes=((2, 2),), reward="mine:single")))
     for name, message in (
         ("mine:nothing", "reward 'mine:nothing' can't be imported.*give module:function"),
@@ -919,10 +919,10 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
             {"imitation_weight": 2.0},
             "imitation_weight = 2 needs an expert, and none is given; name one, or leave it out",
         ),
-        ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
+        ({"scenario": "lossy"}, "training can't represent the loss of a vehicle"),
         ({"sizes": [0]}, "sizes.0.0 must be greater than or equal to 1, got 0"),
         ({"sizes": [[5, -1]]}, "sizes.0.1 must be greater than or equal to 0, got -1"),
-        ({"extra_scenarios": ["lossy"]}, "training can't show that a vehicle is lost"),
+        ({"extra_scenarios": ["lossy"]}, "training can't represent the loss of a vehicle"),
         (
             {"extra_scenarios": ["few_informed"]},
             "extra_scenarios has 'few_informed' with another percept than 'starter', and one network",

@@ -79,7 +79,9 @@ def test_a_map_depends_on_its_seed_alone():
         alone = waters()
         alone.reset(TUNING + w)
         for mine, theirs in zip(
-            (alone.world_map, alone.state, alone.task.memory), (batch.world_map, batch.state, batch.task.memory), strict=True
+            (alone.world_map, alone.state, alone.task.memory),
+            (batch.world_map, batch.state, batch.task.memory),
+            strict=True,
         ):
             for name, array in mine._asdict().items():
                 np.testing.assert_array_equal(array[0], theirs._asdict()[name][w], err_msg=name)

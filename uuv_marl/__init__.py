@@ -22,35 +22,24 @@ if TYPE_CHECKING:
     from uuv_marl.scenario import load_scenario, scenario_names
 
 __all__ = [
-    "__version__",
-    "baselines",
-    "env",
-    "evaluate",
-    "load_scenario",
-    "make_policy",
-    "parallel_env",
-    "scenario_names",
-    "uuv_swarm_v1",
-    "vector_env",
-    "with_policy_requirements",
-]
+    "__version__", "baselines", "env", "evaluate", "load_scenario", "make_policy", "parallel_env", "scenario_names",
+    "uuv_swarm_v1", "vector_env", "with_policy_requirements",
+]  # fmt: skip
 
 _HOMES = {
-    "evaluate": "uuv_marl.benchmark.evaluate",
-    "make_policy": "uuv_marl.baselines",
-    "with_policy_requirements": "uuv_marl.baselines",
-    "env": "uuv_marl.envs.parallel_env",
-    "parallel_env": "uuv_marl.envs.parallel_env",
-    "vector_env": "uuv_marl.envs.vector_env",
-    "load_scenario": "uuv_marl.scenario",
-    "scenario_names": "uuv_marl.scenario",
+    "uuv_marl.baselines": ("make_policy", "with_policy_requirements"),
+    "uuv_marl.benchmark.evaluate": ("evaluate",),
+    "uuv_marl.envs.parallel_env": ("env", "parallel_env"),
+    "uuv_marl.envs.vector_env": ("vector_env",),
+    "uuv_marl.scenario": ("load_scenario", "scenario_names"),
 }
 
 
 def __getattr__(name: str) -> Any:
     """Import on first use, so that ``import uuv_marl`` is quick."""
-    if name in _HOMES:
-        return getattr(importlib.import_module(_HOMES[name]), name)
+    for module, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(module), name)
     if name in ("baselines", "uuv_swarm_v1"):
         return importlib.import_module(f"uuv_marl.{name}")
     raise AttributeError(f"module 'uuv_marl' has no attribute {name!r}")

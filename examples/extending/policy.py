@@ -13,18 +13,18 @@ Float32 = NDArray[np.float32]
 
 
 class Memory(NamedTuple):
-    """What each vehicle keeps from decision to decision."""
+    """The memory of each vehicle."""
 
     desired: Annotated[Float32, "world vehicle 2", "Smoothed direction to the reference point, in the body frame [1]."]
 
 
 class Smooth(baselines.Policy):
-    """Half thrust towards the reference point, whose direction is smoothed, and away from the nearest neighbour."""
+    """Half thrust in the smoothed direction of the reference point, and away from near neighbours."""
 
     Memory: ClassVar[type[Any] | None] = Memory
 
     def remember(self, percept: Percept, worlds: NDArray[np.bool_]) -> None:
-        """Take the new direction into the mean, in the worlds that have gone on."""
+        """Update the mean direction in the worlds that were stepped, shape (world,)."""
         to_reference = percept["reference"]
         length = np.maximum(np.linalg.norm(to_reference, axis=-1, keepdims=True), 1e-3)
         self.memory.desired[worlds] += 0.2 * ((to_reference / length) - self.memory.desired)[worlds]

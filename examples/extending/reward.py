@@ -1,15 +1,14 @@
-"""A reward of your own: a function from the swarm after a step to a number for every vehicle of every world."""
+"""A reward of your own: a function from the swarm after a step to an array, shape (world, vehicle)."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 import uuv_marl
-from uuv_marl import baselines
 from uuv_marl.sim.swarm import Swarm
 
 
 def close_and_careful(swarm: Swarm) -> NDArray[np.float64]:
-    """Near the reference point is good, near an obstacle or a neighbour is bad. Shape (world, vehicle).
+    """Cost of the distance to the reference point, of nearness and of collisions, shape (world, vehicle).
 
     ``swarm.state`` and ``swarm.facts`` hold the arrays; ``help(uuv_marl.sim.arrays.Facts)`` explains each.
     """
@@ -21,12 +20,11 @@ def close_and_careful(swarm: Swarm) -> NDArray[np.float64]:
 
 
 if __name__ == "__main__":
-    scenario = baselines.with_policy_requirements("bio_inspired_plus", uuv_marl.load_scenario("starter"))
-    env = uuv_marl.parallel_env(scenario, reward=close_and_careful)
-    policy = baselines.make_policy("bio_inspired_plus", env)
+    env = uuv_marl.parallel_env("starter", for_policy="bio_inspired_plus", reward=close_and_careful)
+    policy = uuv_marl.make_policy("bio_inspired_plus", env)
     observations, _ = env.reset(seed=0)
     total = 0.0
     while env.agents:
         observations, rewards, *_ = env.step(policy(observations))
         total += sum(rewards.values())
-    print(f"all vehicles together were paid {total:.1f}")
+    print(f"sum of all rewards: {total:.1f}")

@@ -6,15 +6,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl import baselines, load_scenario
+import uuv_marl
 from uuv_marl.baselines.paper.bio_inspired import BioInspiredPlus
-from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 
 
 def turned(percept: Percept, angle: float) -> Percept:
-    """What vehicles know whose sonar is turned by this angle to starboard [rad] and nobody has told them."""
+    """The percept with bearings that are off by this angle, positive to starboard [rad]."""
     known = dataclasses.replace(percept, flat=percept.flat.copy())
     c, s = math.cos(angle), math.sin(angle)
     for name in ("neighbour", "echo_position"):  # help(uuv_marl.percept.Percept) lists the fields
@@ -24,17 +23,17 @@ def turned(percept: Percept, angle: float) -> Percept:
 
 
 class Askew(BioInspiredPlus):
-    """The paper's law in its strongest form, which is told wrong bearings. Any policy without memory can be wrapped so.
+    """The paper's controller in its strongest form, with wrong bearings; any policy without memory may be wrapped so.
 
     Args:
-        scenario: gives the vehicle's limits.
+        scenario: of the vehicles.
         num_worlds: first axis of the percepts.
-        degrees: by which the sonar is turned to starboard.
+        degrees: angle of the sonar to starboard.
     """
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, degrees: float = 20.0) -> None:
         super().__init__(scenario, num_worlds)
-        self._angle = -math.radians(degrees)  # what is ahead of the ship seems to lie to port of the sonar's axis
+        self._angle = -math.radians(degrees)  # an obstacle ahead lies to port of the sonar's axis
 
     def decide(self, percept: Percept) -> NDArray[np.float32]:
         """Shares of full force and torque, shape (world, vehicle, 2)."""
@@ -42,8 +41,7 @@ class Askew(BioInspiredPlus):
 
 
 if __name__ == "__main__":
-    scenario = baselines.with_policy_requirements("bio_inspired_plus", load_scenario("starter"))
     for degrees in (0.0, 20.0, 60.0):
-        (run,) = [e for e in episodes(scenario, "sensor:Askew", [0], degrees=degrees) if isinstance(e, Run)]
-        time_s, away = run.metrics["task_time_s"] or float("nan"), run.metrics["min_obstacle_distance_m"]
+        (metrics,) = uuv_marl.evaluate(f"sensor:Askew,degrees={degrees}", "starter", [0])
+        time_s, away = metrics["task_time_s"] or float("nan"), metrics["min_obstacle_distance_m"]
         print(f"{degrees:g} deg askew: arrived after {time_s:.1f} s, {away:.1f} m from the obstacle")

@@ -16,7 +16,7 @@ Floats, Bool = NDArray[np.floating[Any]], NDArray[np.bool_]
 
 
 class Rendezvous(Task):
-    """Come within ``near_m`` of the swarm's centre, all of you, without touching. No vehicle perceives a reference."""
+    """All come within ``near_m`` of the swarm's centre without a collision. No vehicle perceives a reference."""
 
     class Numbers(Section):
         near_m: Positive = 10.0

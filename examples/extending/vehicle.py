@@ -1,10 +1,9 @@
-"""A vehicle of your own: its file gives all numbers of hull and actuators, and a scenario names it."""
+"""A vehicle of your own: a file with all numbers of its hull and actuators, named by a scenario."""
 
 import tempfile
 from pathlib import Path
 
-from uuv_marl import baselines, load_scenario
-from uuv_marl.benchmark.evaluate import Run, episodes
+import uuv_marl
 
 SLOW = """
 [vehicle]
@@ -38,8 +37,7 @@ if __name__ == "__main__":
         path = Path(folder) / "slow.toml"
         path.write_text(SLOW)
         for vehicle in ("literature_185", str(path)):
-            changed = load_scenario("starter", overrides={"vehicle": vehicle, "trajectory.speed_mps": 2.0})
-            scenario = baselines.with_policy_requirements("bio_inspired", changed)
-            (run,) = [event for event in episodes(scenario, "bio_inspired", [0]) if isinstance(event, Run)]
-            time_s, collisions = run.metrics["task_time_s"] or float("nan"), run.metrics["collisions"]
-            print(f"{scenario.vehicle.name}: arrived after {time_s:.1f} s, {collisions} collisions")
+            overrides = {"vehicle": vehicle, "trajectory.speed_mps": 2.0}
+            (metrics,) = uuv_marl.evaluate("bio_inspired", "starter", [0], overrides=overrides)
+            time_s, collisions = metrics["task_time_s"] or float("nan"), metrics["collisions"]
+            print(f"{Path(vehicle).stem}: arrived after {time_s:.1f} s, {collisions} collisions")

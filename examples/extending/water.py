@@ -1,4 +1,4 @@
-"""A current of your own: a tide that turns. Before every step it is written into the water, around any environment."""
+"""A current of your own: a tide, written into the simulation before every step by a wrapper of any environment."""
 
 from typing import Any
 
@@ -6,19 +6,17 @@ import numpy as np
 from pettingzoo.utils import BaseParallelWrapper
 
 import uuv_marl
-from uuv_marl import baselines
 from uuv_marl.envs.parallel_env import SwarmParallelEnv
 
 PERIOD_S = 40.0
-"""Of the tide, far shorter than a real one, so that the swarm meets both directions."""
+"""Period of the tide, far shorter than a real one, so that an episode has both directions."""
 
 
 class Tide(BaseParallelWrapper[str, Any, Any]):
-    """The scenario's own current as it is at high water, and in between less of it, or against it.
+    """The scenario's own current, multiplied by the cosine of the tide.
 
-    ``swarm.currents`` holds how the water moves: ``mean``, ``gust`` and ``eddies``, first axis the world. What is
-    written there before a step is what vehicles meet from then on, what pictures draw, and what ``swarm.flow_field()``
-    gives anywhere.
+    ``swarm.currents`` holds the current: ``mean``, ``gust`` and ``eddies``, first axis the world. A change before a
+    step acts on vehicles from then on; pictures and ``swarm.flow_field()`` show it.
     """
 
     def __init__(self, env: SwarmParallelEnv) -> None:
@@ -34,16 +32,16 @@ class Tide(BaseParallelWrapper[str, Any, Any]):
         return result
 
     def step(self, actions: dict[str, Any]) -> Any:
-        """One decision, at whose end the tide has come on."""
+        """One decision, in the current of its end."""
         time_s = self._swarm.facts.time_s + self._swarm.scenario.timing.decision_period_s
         self._water.mean[:] = self._high * np.cos(2.0 * np.pi * time_s / PERIOD_S)[:, None]
         return super().step(actions)
 
 
 if __name__ == "__main__":
-    changed = uuv_marl.load_scenario("starter", overrides={"current.speed_mps": 0.8, "current.direction_deg": 90.0})
-    env = uuv_marl.parallel_env(baselines.with_policy_requirements("bio_inspired_plus", changed))
-    tidal, policy, eastward = Tide(env), baselines.make_policy("bio_inspired_plus", env), list[float]()
+    current = {"current.speed_mps": 0.8, "current.direction_deg": 90.0}
+    env = uuv_marl.parallel_env("starter", for_policy="bio_inspired_plus", overrides=current)
+    tidal, policy, eastward = Tide(env), uuv_marl.make_policy("bio_inspired_plus", env), list[float]()
     observations, infos = tidal.reset(seed=0)
     while tidal.agents:
         observations, _, _, _, infos = tidal.step(policy(observations))

@@ -84,7 +84,7 @@ def test_every_scenario_is_a_task_or_refused(tmp_path):
         entries = 98 + {"few_informed": 1, "silent_targets": 2}.get(env.scenario.task.name, 0)  # what tasks tell
         assert env.reset()["uuv", "observation"].shape == (2, env.scenario.swarm.num_vehicles, entries)
     lossy = SwarmTask.TRACKING.get_task({**SMALL, "scenario": "lossy", "num_vehicles": 8})
-    with pytest.raises(ScenarioError, match="BenchMARL can't show that a vehicle is lost"):
+    with pytest.raises(ScenarioError, match="BenchMARL can't represent the loss of a vehicle"):
         experiment(tmp_path, lossy)
 
 

@@ -1,1 +1,1 @@
-"""Environments: one contract (observation, reward, endings), many APIs."""
+"""Environments: the same observations, rewards and endings in many APIs."""

@@ -1,4 +1,4 @@
-"""``SwarmTask``: our scenarios as BenchMARL tasks, so that every BenchMARL algorithm runs on them."""
+"""``SwarmTask``: the scenarios as BenchMARL tasks."""
 
 from collections.abc import Callable
 from typing import Any, cast
@@ -15,9 +15,9 @@ from uuv_marl.envs.torchrl import GROUP, SwarmEnv
 
 
 class SwarmTaskClass(TaskClass):
-    """Makes ``uuv_marl.envs.torchrl.SwarmEnv``; ``config`` holds its arguments but for the number of worlds and seed.
+    """Makes ``uuv_marl.envs.torchrl.SwarmEnv`` with the arguments in ``config``, such as ``for_policy``.
 
-    BenchMARL trains on the rows of all vehicles alike. A scenario in which a vehicle can be lost is an error.
+    A scenario in which a vehicle can be lost is an error: BenchMARL trains on the rows of all vehicles.
     """
 
     def get_env_fun(
@@ -27,14 +27,7 @@ class SwarmTaskClass(TaskClass):
         seed: int | None,
         device: Any,
     ) -> Callable[[], EnvBase]:
-        """A function that makes the environment.
-
-        Args:
-            num_envs: worlds stepped together.
-            continuous_actions: ignored: forces are continuous.
-            seed: world w starts from ``seed + w``; None for fresh entropy.
-            device: where the tensors go.
-        """
+        """A function that makes the environment with ``num_envs`` worlds; world w starts from ``seed + w``."""
         refuse_losses(make_batched_env(**self._arguments).swarm.scenario, "BenchMARL")
         return lambda: SwarmEnv(num_envs, seed=seed, device=device, **self._arguments)
 
@@ -43,19 +36,19 @@ class SwarmTaskClass(TaskClass):
         return {"scenario": self.name.lower(), **self.config}
 
     def supports_continuous_actions(self) -> bool:
-        """Forces are continuous."""
+        """True: forces are continuous."""
         return True
 
     def supports_discrete_actions(self) -> bool:
-        """Forces are continuous."""
+        """False: forces are continuous."""
         return False
 
     def max_steps(self, env: EnvBase) -> int:  # noqa: ARG002
-        """Decisions after which every episode is over."""
+        """Decisions of the longest episode."""
         return make_batched_env(**self._arguments).longest_episode
 
     def has_render(self, env: EnvBase) -> bool:  # noqa: ARG002
-        """False: TorchRL's environment draws nothing; ``uuv_marl.parallel_env`` draws."""
+        """False: use ``uuv_marl.parallel_env`` for pictures."""
         return False
 
     def group_map(self, env: EnvBase) -> dict[str, list[str]]:
@@ -68,7 +61,7 @@ class SwarmTaskClass(TaskClass):
         return Composite({GROUP: Composite({"observation": group["observation"].clone()}, shape=group.shape)})
 
     def info_spec(self, env: EnvBase) -> Composite | None:  # noqa: ARG002
-        """Nothing is logged beyond rewards and endings."""
+        """None: no entries beyond rewards and endings."""
         return None
 
     def state_spec(self, env: EnvBase) -> Composite:
@@ -80,7 +73,7 @@ class SwarmTaskClass(TaskClass):
         return env.full_action_spec_unbatched
 
     def action_mask_spec(self, env: EnvBase) -> Composite | None:  # noqa: ARG002
-        """Every force is allowed."""
+        """None: every action is allowed."""
         return None
 
     @staticmethod
@@ -95,24 +88,10 @@ class SwarmTask(Task):
     ``get_task(config={"num_vehicles": 10, "decision_period": 0.5})`` takes the arguments of ``parallel_env``.
     """
 
-    STARTER = None
-    HARD_WATER_EASY = None
-    HARD_WATER = None
-    HARD_WATER_HARD = None
-    TWO_SWARMS_EASY = None
-    TWO_SWARMS = None
-    TWO_SWARMS_HARD = None
-    SILENT_TARGETS = None
-    SILENT_TARGETS_EASY = None
-    SILENT_TARGETS_HARD = None
-    FEW_INFORMED_EASY = None
-    FEW_INFORMED = None
-    FEW_INFORMED_HARD = None
-    TRAINING_FIELD = None
-    TRACKING = None
-    SINGLE_OBSTACLE = None
-    MULTI_OBSTACLE = None
-    RANDOM_FIELD = None
+    STARTER = TRAINING_FIELD = TRACKING = SINGLE_OBSTACLE = MULTI_OBSTACLE = RANDOM_FIELD = None
+    HARD_WATER_EASY = HARD_WATER = HARD_WATER_HARD = TWO_SWARMS_EASY = TWO_SWARMS = TWO_SWARMS_HARD = None
+    SILENT_TARGETS_EASY = SILENT_TARGETS = SILENT_TARGETS_HARD = None
+    FEW_INFORMED_EASY = FEW_INFORMED = FEW_INFORMED_HARD = None
 
     @staticmethod
     def associated_class() -> type[TaskClass]:
@@ -120,5 +99,5 @@ class SwarmTask(Task):
         return SwarmTaskClass
 
     def get_from_yaml(self, path: str | None = None) -> TaskClass:
-        """The task with the arguments in a YAML file, by default without arguments: BenchMARL has no file of ours."""
+        """The task with the arguments in a YAML file, by default none: BenchMARL has no file for it."""
         return self.get_task({}) if path is None else super().get_from_yaml(path)

@@ -43,7 +43,7 @@ def changed(scenario: ScenarioLike, for_policy: str | None = None, **changes: Un
 
     Args:
         scenario: a name, a TOML file or a ``Scenario``.
-        for_policy: policy whose requirements the scenario gets after the other changes.
+        for_policy: a policy; the scenario gets its requirements after the other changes.
         changes: ``num_vehicles`` replaces the scenario's number of vehicles, ``decision_period`` the time between
             decisions [s], ``task`` the task (``mine:Rendezvous``), and ``overrides`` any field, as in
             ``{"sonar.echo_reports": "surface"}``.

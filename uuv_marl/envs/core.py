@@ -26,15 +26,15 @@ class StepResult(NamedTuple):
     reward: Float64
     """Zero for vehicles that were lost in an earlier step."""
     terminated: Bool
-    """True where the arrival of the swarm ends the episode, or where the vehicle was lost in this step."""
+    """True if the task is done and ends the episode, or the vehicle was lost in this step."""
     truncated: Bool
-    """True where the time limit ends the episode, for vehicles that are not lost."""
+    """True if the time limit ends the episode, for vehicles that are not lost."""
     acting: Bool
-    """True for vehicles that act in the next step: they are not lost, and their world's episode has not ended."""
+    """True for vehicles that act in the next step: not lost, and in an episode that goes on."""
     world_reward: Float64
     """Shape (world,): the mean over all vehicles, before ``team`` adds a lost vehicle's own loss."""
     world_terminated: Bool
-    """Shape (world,): the arrival of the swarm ends the episode, or all vehicles are lost."""
+    """Shape (world,): the task is done, or all vehicles are lost."""
     world_truncated: Bool
     """Shape (world,): the time limit ends the episode."""
     term_values: Float64
@@ -53,38 +53,25 @@ class StepResult(NamedTuple):
 
 
 class BatchedEnv:
-    """A swarm with the reward and the endings of the environment's contract.
+    """A swarm of ``num_worlds`` with the reward and the endings of every environment.
 
-    Args:
-        scenario: what to simulate.
-        num_worlds: worlds stepped together.
-        reward: ``dense`` (the sum of a vehicle's terms, see the task), ``sparse`` (the same without progress) and
-            ``geodesic`` (progress along the shortest collision-free path) and ``leader`` (informed vehicles get the
-            mean) where the task has them, ``team`` (every vehicle gets the mean of ``dense``; a lost vehicle also its
-            own loss), or a function from the swarm to an array (world, vehicle).
-        max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
-        observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
-        keep_terms: whether steps return the reward's terms, which takes time in large batches.
+    Arguments are explained by ``uuv_marl.parallel_env``; without ``keep_terms`` steps omit the reward's terms, which
+    saves time in large batches.
     """
 
     def __init__(
-        self,
-        scenario: Scenario,
-        num_worlds: int = 1,
-        reward: Reward = "dense",
-        max_cycles: int | None = None,
-        observe: Observe = "positions",
-        keep_terms: bool = True,
-    ) -> None:
+        self, scenario: Scenario, num_worlds: int = 1, reward: Reward = "dense", max_cycles: int | None = None,
+        observe: Observe = "positions", keep_terms: bool = True,
+    ) -> None:  # fmt: skip
         self.swarm = Swarm(scenario, num_worlds)
         self.layout = observation_layout(scenario, observe)
-        """The table of an observation."""
+        """The fields of an observation."""
         self.task: Task = self.swarm.task
         names = (*self.task.rewards, "team")
         if not callable(reward) and reward not in names:
             raise ValueError(
-                f"reward must be {', '.join(map(repr, names))} or a function of the swarm, got {reward!r}; these are "
-                f"the rewards of task {scenario.task.name!r}"
+                f"reward must be {', '.join(map(repr, names))} or a function of the swarm, got {reward!r}; "
+                f"choose one of task {scenario.task.name!r}"
             )
         if reward in self.task.rewards:
             self.task.reward_name = str(reward)
@@ -94,19 +81,10 @@ class BatchedEnv:
         self.over = np.zeros(num_worlds, np.bool_)
         """Worlds whose episode has ended, shape (world,)."""
         self.collisions = np.zeros(num_worlds, np.int64)
-        """Contact episodes that began since the reset, shape (world,)."""
-        self.max_cycles = max_cycles
+        """Collisions that began since the reset, shape (world,)."""
+        self.max_cycles = None if max_cycles is None else whole_number("max_cycles", max_cycles, 1)
         self._reward: Reward = reward
         self._keep_terms = keep_terms or reward == "team"
-
-    @property
-    def max_cycles(self) -> int | None:
-        """Decisions after which an episode is truncated."""
-        return self._max_cycles
-
-    @max_cycles.setter
-    def max_cycles(self, value: int | None) -> None:
-        self._max_cycles = None if value is None else whole_number("max_cycles", value, 1)
 
     @property
     def longest_episode(self) -> int:
@@ -135,7 +113,7 @@ class BatchedEnv:
     def check_reset(self, what: str) -> None:
         """Raise RuntimeError if a world was never reset."""
         if self._waiting:
-            raise RuntimeError(f"{what} came before reset; call reset() to start an episode")
+            raise RuntimeError(f"{what} was called before reset; call reset() to start an episode")
 
     def step(self, action: ArrayLike) -> StepResult:
         """One decision of every world; ``action`` has shape (world, vehicle, 2).
@@ -152,8 +130,8 @@ class BatchedEnv:
         mean = step_reward.total.sum(axis=1) / swarm.num_vehicles  # twice as fast as mean(axis=1), and its bits
         team = self._reward == "team"
         world_terminated, world_truncated = swarm.endings()
-        if self._max_cycles is not None:
-            last_tick = self._max_cycles * swarm.scenario.timing.control_steps_per_decision
+        if self.max_cycles is not None:
+            last_tick = self.max_cycles * swarm.scenario.timing.control_steps_per_decision
             world_truncated |= (swarm.state.tick >= last_tick) & ~world_terminated
         self.over = world_terminated | world_truncated
         return StepResult(
@@ -220,18 +198,9 @@ def make_batched_env(
     for_policy: str | None = None,
     **changes: Unpack[Changes],
 ) -> BatchedEnv:
-    """Worlds from the arguments that every environment API takes.
+    """Worlds from the arguments that every environment API takes: those of ``BatchedEnv`` and ``changed``.
 
-    Args:
-        scenario: a name, a TOML file or a ``Scenario``.
-        num_worlds: worlds stepped together.
-        order: names of the API's first two arguments, for errors: libraries begin with one or the other.
-        max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
-        reward: ``dense``, ``sparse``, ``team``, one of the task's, or a function from the swarm to (world, vehicle).
-        observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
-        keep_terms: whether steps return the reward's terms.
-        for_policy: policy whose requirements the scenario gets.
-        changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.
+    ``order`` names the API's first two arguments, for errors: libraries begin with one or the other.
     """
     (number,) = {*order} - {"scenario"}
     remedy = f"the first argument is {order[0]}, the second {order[1]}"
@@ -245,10 +214,10 @@ def make_batched_env(
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:
-    """Raise ScenarioError if vehicles can be lost, for an API in which all rows must live to the episode's end."""
+    """Raise ScenarioError if vehicles can be lost, for an API in which all rows last until the episode's end."""
     if scenario.loses_vehicles:
         raise ScenarioError(
-            f"{api} can't show that a vehicle is lost, which can happen in scenario {scenario.name!r}; use "
+            f"{api} can't represent the loss of a vehicle, which can happen in scenario {scenario.name!r}; use "
             "uuv_marl.parallel_env, vector_env or the TorchRL or RLlib environment, or override "
             "losses.times_s=[] and collision.ends_vehicle=false, and leave out faults of kind member"
         )

@@ -1,4 +1,4 @@
-"""How an episode ended, or stands: entries of infos, in every API."""
+"""How an episode ended, or its present state: entries of infos in every API."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ def succeeded(batch: BatchedEnv, world: int, vehicle: int | None = None) -> bool
 
 
 def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[str, Any]:
-    """Why the episode of a world, or of one vehicle, ended, or that it goes on; as plain Python values.
+    """Why the episode of a world or of one vehicle ended, or that it goes on; as plain Python values.
 
     Args:
         batch: the worlds, before the next step or reset of an episode that has ended.
@@ -21,13 +21,11 @@ def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[st
         vehicle: index of the vehicle; None for the world as a whole.
 
     Returns:
-        ``is_success`` (in ``follow`` the swarm arrived, and this vehicle, or any of them, was there to the end; in
-        other tasks this vehicle, or all of them, are there untouched; the name under which libraries look for it),
-        ``ending`` (``arrival``, or ``done`` in other tasks, ``time_limit``: also after an arrival where
-        ``arrival.ends_episode`` is false, ``lost``: this vehicle or all of them, or ``diverged``: the integration step
-        is too long; ``running`` until then),
-        ``arrived`` (the swarm did, or the task is done), ``time_s`` since the reset, and ``collisions``, the contact
-        episodes of the whole swarm until now.
+        ``is_success`` (in ``follow`` the swarm arrived and this vehicle, or any, was not lost; in other tasks this
+        vehicle, or all, are at the goal and collision-free), ``ending`` (``arrival`` in ``follow``, ``done`` in other
+        tasks, ``time_limit``, also after an arrival if ``arrival.ends_episode`` is false, ``lost``: this vehicle or
+        all, ``diverged``: the integration step is too long, or ``running``), ``arrived`` (the swarm has arrived, or the
+        task is done), ``time_s`` since the reset, and ``collisions``, those of the whole swarm so far.
     """
     swarm, task = batch.swarm, batch.task
     done, arrived = bool(task.done()[world]), task.arrived(world)

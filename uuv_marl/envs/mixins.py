@@ -1,4 +1,4 @@
-"""What the environments of all APIs have in common: the worlds below, and pictures of them."""
+"""Common parts of the environments of all APIs: their worlds, and pictures of them."""
 
 from dataclasses import replace
 from typing import Any
@@ -16,7 +16,7 @@ from uuv_marl.sim.swarm import Swarm
 
 
 class EnvMixin:
-    """What the environments of every API share: a ``BatchedEnv`` below, its scenario and swarm, and pictures."""
+    """A ``BatchedEnv``, its scenario and swarm, and pictures."""
 
     _batch: BatchedEnv
     _renderer: Renderer
@@ -26,7 +26,7 @@ class EnvMixin:
         self, batch: BatchedEnv, render_mode: str | None, options: RenderOptions | None = None,
         sonar_of: int | None = None,
     ) -> None:  # fmt: skip
-        """Stand on these worlds; ``sonar_of``: the vehicle whose sonar is drawn where the options name none."""
+        """Wrap these worlds; ``sonar_of``: index of the inspected vehicle if the options name none."""
         self._batch = batch
         self._renderer = Renderer(batch, render_mode, self.metadata["render_modes"], options, sonar_of)
         self.render_mode = render_mode
@@ -39,42 +39,40 @@ class EnvMixin:
 
     @property
     def scenario(self) -> Scenario:
-        """What is simulated."""
+        """The scenario that is simulated."""
         return self._batch.swarm.scenario
 
     @property
     def observes_positions(self) -> bool:
-        """Whether policies can read the observations: ``observe="positions"``."""
+        """Whether policies can use the observations: ``observe="positions"``."""
         return self._batch.layout == self.swarm.layout
 
     @property
     def swarm(self) -> Swarm:
-        """The simulation: truth that agents don't observe, for evaluation and custom rewards."""
+        """The simulation, with state that agents don't observe, for evaluation and rewards."""
         return self._batch.swarm
 
 
 class SpecMixin:
-    """Gymnasium's ``spec`` in a form that JSON can hold: a scenario in it is its fields, a path or a mode is text."""
+    """Gymnasium's ``spec`` with values that JSON can hold: a scenario as its fields, a path or a mode as text."""
 
     _spec: EnvSpec | None = None
 
     @property
     def spec(self) -> EnvSpec | None:
-        """How ``gymnasium.make`` made this environment, and makes its like."""
+        """The specification from which ``gymnasium.make`` made this environment."""
         return self._spec
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         if spec is not None:
-            arguments = {
-                name: getattr(value, "value", value) for name, value in spec.kwargs.items()
-            }  # of an enumeration
-            spec = replace(spec, kwargs={name: plain(value) for name, value in arguments.items()})
+            kwargs = {name: plain(getattr(value, "value", value)) for name, value in spec.kwargs.items()}
+            spec = replace(spec, kwargs=kwargs)  # with the values of enumerations
         self._spec = spec
 
 
 class RenderMixin(EnvMixin):
-    """What the environments of one world share: pictures and a window."""
+    """Pictures and a window of an environment of one world."""
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""

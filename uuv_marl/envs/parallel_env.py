@@ -24,18 +24,12 @@ Infos = dict[str, dict[str, Any]]
 
 
 class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
-    """A swarm of UUVs that follows a trajectory around obstacles; ``parallel_env`` makes one.
+    """A swarm of UUVs as PettingZoo agents; ``parallel_env`` makes one.
 
     Observation: the vehicle's percept, flattened and scaled by the table in ``uuv_marl.percept``. Action: surge force
-    and yaw torque as shares of full force, projected onto the unit disc.
-
-    An agent's last info tells how its episode ended: ``is_success``, ``ending``, ``arrived``, ``time_s``,
-    ``collisions`` (``uuv_marl.envs.ending.ending``). ``np_random`` is a generator for wrappers and users:
-    ``reset(seed=s)`` seeds it from ``s``, and the environment itself never draws from it.
-
-    Args:
-        batch: the simulation, of one world.
-        render_mode, info_terms, render_options: as for ``parallel_env``.
+    and yaw torque as shares of full force, shape (2,), projected onto the unit disc. An agent's last info holds how its
+    episode ended (``uuv_marl.envs.ending.ending``). ``np_random`` is a generator for wrappers and users, seeded by
+    ``reset(seed=s)``; the environment itself never draws from it.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo's own form
@@ -73,11 +67,11 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         self._batch.max_cycles = value
 
     def observation_space(self, agent: str) -> Space[Any]:
-        """The observation space of an agent, the same object for every call."""
+        """The observation space of an agent, always the same object."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Space[Any]:
-        """The action space of an agent, the same object for every call."""
+        """The action space of an agent, always the same object."""
         return self.action_spaces[agent]
 
     def reset(
@@ -101,7 +95,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         """One decision of every agent. After the episode's end, ``step({})`` returns empty dictionaries.
 
         Raises:
-            ValueError: an agent's action is missing, misshapen or not finite, or an agent is unknown.
+            ValueError: an action is missing, misshapen or not finite, or an agent is unknown.
             RuntimeError: before ``reset``, or with actions after the episode's end.
         """
         if not self.agents:
@@ -144,7 +138,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
             values = self._one_by_one(actions)
         if len(actions) > len(values) and not actions.keys() <= self._index.keys():
             unknown = min(actions.keys() - self._index.keys(), key=str)
-            raise ValueError(f"there is no agent {unknown!r}; agents are uuv_0 to {self.possible_agents[-1]}")
+            raise ValueError(f"agent {unknown!r} is unknown; agents are uuv_0 to {self.possible_agents[-1]}")
         if len(values) == len(self.possible_agents):
             return values[None]
         array = np.zeros((1, len(self.possible_agents), 2), np.float32)
@@ -152,7 +146,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         return array
 
     def _one_by_one(self, actions: Mapping[str, ArrayLike | None]) -> Float32:
-        """Every agent's action. Raises ValueError with the first agent whose action can't be used."""
+        """Every agent's action. Raises ValueError for the first one that can't be used."""
         if not isinstance(actions, Mapping):
             raise TypeError(f"actions must be a dictionary with an action for each agent, got {type(actions).__name__}")
         rows: list[Float32] = []
@@ -191,21 +185,22 @@ def parallel_env(
         num_vehicles: number of vehicles; None for the scenario's number.
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
         render_mode: ``human``, ``rgb_array`` or None.
-        render_options: how to draw: a dictionary with any of ``size`` ((width, height) [px]), ``camera`` (``follow`` or
-            ``map``) and ``sonar_of`` (index of the vehicle whose sonar is shown).
-        reward: ``dense`` (progress, costs and arrival), ``sparse`` (without progress; only in ``follow``), ``geodesic``
-            (progress along the free way; only in ``hard_water``), ``led`` (the informed get the mean; only in
-            ``few_informed``), ``team`` (all get the mean of ``dense``) or a function from swarm to (world, vehicle).
+        render_options: a dictionary with any of ``size`` ((width, height) [px]), ``camera`` (``follow`` or ``map``) and
+            ``sonar_of`` (index of a vehicle, to show its sonar).
+        reward: ``dense`` (progress, costs and arrival), ``sparse`` (without progress; ``follow`` alone), ``geodesic``
+            (progress along the collision-free path; ``hard_water`` alone), ``leader`` (informed vehicles get the mean;
+            ``few_informed`` alone), ``team`` (all get the mean of ``dense``) or a function from the swarm to an array
+            (world, vehicle).
         info_terms: put the reward's terms into every agent's info.
-        observe: ``positions``, or ``closeness``: the same percept, the larger the nearer a thing is, which networks
-            learn from sooner; docs/environment.md has both tables.
-        task: what is to be done, in place of the scenario's own: a name of ``uuv_marl.tasks.TASKS``, or
-            ``module:Class`` for your own; or a table with it as ``name`` and the task's numbers.
-        decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces
+        observe: ``positions``, or ``closeness``: the same percept as values that grow as things come nearer, from which
+            networks learn sooner; docs/environment.md has both tables.
+        task: replaces the scenario's task: a name of ``uuv_marl.tasks.TASKS``, ``module:Class`` for your own, or a
+            table with it as ``name`` and the task's numbers.
+        decision_period: time between decisions [s], a multiple of the control step; replaces
             ``timing.decision_period_s``. Between decisions the force keeps its direction in the world frame.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
-        for_policy: name of a policy whose requirements the scenario gets after all other changes: its channels, yaw
-            damping and decision period (``uuv_marl.with_policy_requirements``).
+        for_policy: name of a policy; the scenario gets its channels, yaw damping and decision period after all other
+            changes (``uuv_marl.with_policy_requirements``).
     """
     batch = make_batched_env(
         scenario, order=("scenario", "num_vehicles"), max_cycles=max_cycles, reward=reward, observe=observe,

@@ -1,14 +1,11 @@
-"""Entries in the registries of Gymnasium and PettingZoo, made when ``uuv_marl`` is imported.
-
-Gymnasium loads no plugins; by an id that begins with ``uuv_marl:`` it imports the package itself.
-"""
+"""Entries in the registries of Gymnasium and PettingZoo; an id that begins with ``uuv_marl:`` imports the package."""
 
 import gymnasium
 import pettingzoo
 
 
 def register_environments() -> None:
-    """Make the environments known to ``gymnasium.make``, ``gymnasium.make_vec`` and ``pettingzoo.make``."""
+    """Register for ``gymnasium.make``, ``gymnasium.make_vec`` and ``pettingzoo.make``."""
     gymnasium.register("uuv_marl/Swarm-v1", vector_entry_point="uuv_marl.envs.vector_env:vector_env")
     gymnasium.register("uuv_marl/Solo-v1", entry_point="uuv_marl.envs.solo:SoloEnv")
     pettingzoo.register("parallel", "uuv_marl/uuv_swarm_v1", "uuv_marl.envs.parallel_env:parallel_env")

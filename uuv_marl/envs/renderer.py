@@ -1,4 +1,4 @@
-"""Pictures of an environment's worlds, as frames or in a window. pygame, an extra, is imported on first use."""
+"""Pictures of an environment's worlds, as arrays or in a window. pygame, an extra, is imported on first use."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,11 +15,11 @@ class Renderer:
     """Draws the worlds of an environment.
 
     Args:
-        batch: gives the worlds, and the pictures per second.
+        batch: the worlds.
         render_mode: one of ``modes``, or None.
-        modes: ``rgb_array``, and ``human`` where the environment can show a window.
-        options: how to draw.
-        sonar_of: vehicle whose sonar is drawn if the options name none.
+        modes: ``rgb_array``, and ``human`` if the environment can show a window.
+        options: see ``RenderOptions``.
+        sonar_of: index of the inspected vehicle if the options name none.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Renderer:
         return pixels(self._canvas.draw([Panel(title, self._scene(self._look.sonar_of, world))], self._look.camera))
 
     def update(self) -> None:
-        """Look at the worlds after a reset or a step; bring a window up to date, if there is one."""
+        """Record the worlds after a reset or a step, and draw them in the window, if there is one."""
         if self.mode is not None:
             self._memory.note(self._batch)
         if self.mode == "human":

@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.envs.parallel_env import Infos, parallel_env
 from uuv_marl.extras import extra
-from uuv_marl.scenario import Scenario
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float32
 
 with extra("distributed", "SwarmMultiAgentEnv"):
@@ -18,22 +17,23 @@ with extra("distributed", "SwarmMultiAgentEnv"):
 
 
 ENV_NAME = "uuv_swarm_v1"
-"""The name under which ``register`` makes the environment known."""
+"""The name that ``register`` uses."""
 
 
-class SwarmMultiAgentEnv(MultiAgentEnv):
-    """The PettingZoo environment in RLlib's form: the same observations and rewards, bit for bit.
+class SwarmMultiAgentEnv(EnvMixin, MultiAgentEnv):
+    """The PettingZoo environment in RLlib's form, with the same observations and rewards.
 
-    A lost vehicle is terminated alone, with an observation of zeros, and never appears again. ``__all__`` is set in
-    ``terminateds`` once the swarm has arrived or no vehicle is left, in ``truncateds`` at the time limit.
+    A lost vehicle is terminated alone, with an observation of zeros, and does not appear again. ``__all__`` is set in
+    ``terminateds`` once the task is done or no vehicle is left, in ``truncateds`` at the time limit.
 
     Args:
-        config: the keyword arguments of ``uuv_marl.parallel_env``; RLlib hands over its ``env_config``.
+        config: RLlib's ``env_config``: the keyword arguments of ``uuv_marl.parallel_env``, such as ``for_policy``.
     """
 
     def __init__(self, config: Mapping[str, Any] | None = None) -> None:
         super().__init__()
         self._env = parallel_env(**(config or {}))
+        self._batch = self._env._batch  # pyright: ignore[reportPrivateUsage]
         self.render_mode = self._env.render_mode
         self.metadata = dict(self._env.metadata)  # RLlib writes into it
         self.possible_agents = list(self._env.possible_agents)
@@ -41,21 +41,6 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
         self._late = False
         self.observation_spaces = self._env.observation_spaces
         self.action_spaces = self._env.action_spaces
-
-    @property
-    def scenario(self) -> Scenario:
-        """What is simulated."""
-        return self._env.scenario
-
-    @property
-    def swarm(self) -> Swarm:
-        """The simulation; ``uuv_marl.baselines.make_policy(name, env)`` follows it."""
-        return self._env.swarm
-
-    @property
-    def observes_positions(self) -> bool:
-        """Whether policies can read the observations: ``observe="positions"``."""
-        return self._env.observes_positions
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -71,8 +56,8 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
     ) -> tuple[dict[str, Float32], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
         """One decision of every agent, as ``SwarmParallelEnv.step``, errors included.
 
-        ``truncateds`` holds only ``__all__``: if every agent had a flag of its own, RLlib would take the episode as
-        terminated, and would learn that nothing follows a time limit.
+        ``truncateds`` holds only ``__all__``: with a flag for every agent RLlib would treat the episode as terminated
+        and would not bootstrap beyond the time limit.
         """
         observations, rewards, terminateds, truncateds, infos = self._env.step(action_dict)
         self.agents = list(self._env.agents)
@@ -90,9 +75,9 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
 
 
 def register() -> str:
-    """Make the environment known to RLlib as ``ENV_NAME``, on every node of the cluster; returns the name.
+    """Register the environment with RLlib as ``ENV_NAME``, on every node of the cluster; returns the name.
 
-    Call it after ``ray.init``, and again after each further ``ray.init``: Ray forgets registrations when it shuts down.
+    Call it after every ``ray.init``: Ray loses registrations when it shuts down.
     """
     register_env(ENV_NAME, SwarmMultiAgentEnv)
     return ENV_NAME

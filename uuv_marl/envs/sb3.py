@@ -24,25 +24,23 @@ with extra("sb3", "SwarmVecEnv"):
 Indices = None | int | Iterable[int]
 
 WORLDS = 8
-"""Worlds by default: with SB3's default PPO, which learns after 2,048 steps, ``starter`` is learned in 12 updates."""
+"""Worlds by default: SB3's default PPO, which updates every 2,048 steps, learns ``starter`` in 12 updates."""
 
 
 class SwarmVecEnv(EnvMixin, VecEnv):
     """``num_worlds`` x vehicles rows; row ``world * vehicles + i`` is vehicle i of a world.
 
-    Observation and action are those of an agent of ``parallel_env``, rewards float32. When a world's episode ends it is
-    reset in the same step, all its rows at once: ``infos[row]`` then holds ``terminal_observation``,
-    ``TimeLimit.truncated``, ``episode`` (return ``r``, length ``l``, its own seconds ``t``) and how the episode ended
-    (``is_success``, ``ending``, ``arrived``, ``time_s``, ``collisions``: ``uuv_marl.envs.ending.ending``). A scenario
-    in which a vehicle can be lost is an error: SB3 has no row that ends and waits.
+    Observation and action are those of an agent of ``parallel_env``, rewards float32. When an episode ends, all rows of
+    its world are reset in the same step, and ``infos[row]`` holds ``terminal_observation``, ``TimeLimit.truncated``,
+    ``episode`` (return ``r``, length ``l``, seconds ``t``) and the ending (``uuv_marl.envs.ending.ending``). A scenario
+    in which a vehicle can be lost is an error: SB3 has no row that ends before its world.
 
     Args:
         scenario: a name, a TOML file or a ``Scenario``.
         num_worlds: worlds stepped together.
         render_mode: ``rgb_array`` or None; the picture tiles all worlds.
         render_options: as for ``uuv_marl.parallel_env``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period``,
-            ``overrides`` and ``for_policy``, as for ``uuv_marl.parallel_env``.
+        options: the other arguments of ``uuv_marl.parallel_env``, such as ``reward`` and ``for_policy``.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - SB3's own form
@@ -72,13 +70,13 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         self._starts = np.full(num_worlds, time.perf_counter())
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Set the seeds of the next reset: world w starts from ``seed + w``. Returns the seed of every row's world."""
+        """Set the seeds of the next reset, ``seed + w`` for world w; returns the seed of every row's world."""
         drawn = int(np.random.default_rng().integers(2**31)) if seed is None else whole_number("seed", seed, 0)
         self._seed = drawn
         return [drawn + world for world in range(self._shape[0]) for _ in range(self._shape[1])]
 
     def reset(self) -> Float32:
-        """Start all worlds, shape (row, entry). Unless ``seed`` was called before, their random streams go on."""
+        """Start all worlds; returns observations (row, entry). Without ``seed`` their random streams continue."""
         observation = self._batch.reset(self._seed)
         self._seed = self._actions = None
         self._forget(np.ones(self._shape[0], np.bool_))
@@ -94,7 +92,7 @@ class SwarmVecEnv(EnvMixin, VecEnv):
     def step_wait(self) -> tuple[Float32, Float32, Bool, list[dict[str, Any]]]:
         """Observations, rewards, dones and infos of every row."""
         if self._actions is None:
-            raise RuntimeError("step_wait came before step_async; call step(actions)")
+            raise RuntimeError("step_wait was called before step_async; call step(actions)")
         actions, self._actions = self._actions, None
         result = self._batch.step(actions)
         self._returns += result.reward
@@ -113,7 +111,7 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         return (observation.reshape(self.num_envs, -1), reward, np.repeat(over, self._shape[1]), infos)
 
     def _end(self, world: int, result: StepResult, infos: list[dict[str, Any]]) -> None:
-        """Write what SB3 wants to know of an ended world into the infos of its rows."""
+        """Write SB3's entries for a world whose episode ended into the infos of its rows."""
         seconds = round(time.perf_counter() - self._starts[world], 6)
         shared = {**ending(self._batch, world), "TimeLimit.truncated": bool(result.world_truncated[world])}
         for i in range(self._shape[1]):
@@ -128,14 +126,12 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         self._returns[worlds], self._lengths[worlds], self._starts[worlds] = 0.0, 0, time.perf_counter()
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
-        """The attribute of this object, once per row: rows share it."""
+        """The attribute of this object, once per row."""
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
         """Not possible: a row has no environment of its own."""
-        raise NotImplementedError(
-            f"rows are vehicles of shared worlds; set {attr_name!r} when you make the environment"
-        )
+        raise NotImplementedError(f"rows share worlds; set {attr_name!r} when you make the environment")
 
     def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
         """Not possible: a reset has no options."""
@@ -145,18 +141,11 @@ class SwarmVecEnv(EnvMixin, VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Not possible: a row has no environment of its own.
-
-        Args:
-            method_name: what was to be called.
-            method_args: what with.
-            indices: for which rows.
-            method_kwargs: what with.
-        """
-        raise NotImplementedError(f"rows are vehicles of shared worlds; call {method_name!r} of the whole environment")
+        """Not possible: a row has no environment of its own."""
+        raise NotImplementedError(f"rows share worlds; call {method_name!r} of the environment itself")
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: Indices = None) -> list[bool]:
-        """Whether rows tell what SB3's ``Monitor`` tells: ``episode``, at an episode's end."""
+        """True for SB3's ``Monitor``, whose entry ``episode`` the infos have."""
         return [wrapper_class is Monitor for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:

@@ -8,13 +8,12 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
 from uuv_marl.baselines import make_policy
-from uuv_marl.envs.changes import Changes, Reward, ScenarioLike
+from uuv_marl.envs.changes import EnvOptions, ScenarioLike
 from uuv_marl.envs.core import StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin, SpecMixin
 from uuv_marl.sim.arguments import action_array, rounding, world_seeds
-from uuv_marl.sim.observation import Observe
 from uuv_marl.types import Float32
 
 
@@ -24,19 +23,17 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     """The learner is vehicle 0 and acts by ``step``; all others run the policy ``others``.
 
     Observation, action and reward are those of one agent of ``parallel_env``. The episode terminates when the swarm
-    arrives or the learner is lost, and is truncated by the time limit; others may be lost on the way. Every info
-    tells how the episode stands, so that a wrapper may end it: ``is_success``, ``ending`` (``running`` until it ends),
-    ``arrived``, ``time_s``, ``collisions`` (``uuv_marl.envs.ending.ending``).
+    arrives or the learner is lost, and is truncated by the time limit; others may be lost before. Every info holds the
+    state of the episode (``uuv_marl.envs.ending.ending``), so that a wrapper may end it.
 
     Args:
         others: name of a policy, or ``module:Class``. The scenario gets its requirements
             (``uuv_marl.with_policy_requirements``), also for the learner: ``sdc`` makes observations longer.
         render_mode: ``human``, ``rgb_array`` or None.
-        render_options: as for ``uuv_marl.parallel_env``; the sonar shown is the learner's unless ``sonar_of`` says
-            otherwise.
+        render_options: as for ``uuv_marl.parallel_env``; ``sonar_of`` is the learner by default.
         info_terms: whether the info holds the reward's terms.
-        scenario, max_cycles, reward, observe: as for ``uuv_marl.parallel_env``.
-        changes: ``num_vehicles``, ``decision_period``, ``task`` and ``overrides``, likewise.
+        scenario: a name, a TOML file or a ``Scenario``.
+        options: the other arguments of ``uuv_marl.parallel_env`` but ``for_policy``.
 
     Raises:
         ScenarioError: a change contradicts a requirement of ``others``.
@@ -52,19 +49,14 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         render_mode: str | None = None,
         render_options: RenderOptions | None = None,
         info_terms: bool = False,
-        max_cycles: int | None = None,
-        reward: Reward = "dense",
-        observe: Observe = "positions",
-        **changes: Unpack[Changes],
+        **options: Unpack[EnvOptions],
     ) -> None:
         if not isinstance(others, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"others must be the name of a policy, or module:Class, got {others!r}")
-        if "for_policy" in changes:
+        if "for_policy" in options:
             raise TypeError(f"SoloEnv takes no for_policy: the scenario suits others={others!r}; leave it out")
-        batch = make_batched_env(
-            scenario, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms, for_policy=others,
-            **changes,
-        )  # fmt: skip
+        options["for_policy"] = others
+        batch = make_batched_env(scenario, keep_terms=info_terms, **options)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make_policy(others, self.scenario)
         self._info_terms = info_terms
@@ -76,7 +68,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Float32, dict[str, Any]]:
-        """Start an episode: with a seed, the episode of ``parallel_env``; without one, the random stream goes on."""
+        """Start an episode: with a seed that of ``parallel_env``, without one the random stream continues."""
         (own,) = world_seeds(seed, [0])
         super().reset(seed=own, options=options)
         observation = self._batch.reset(own)
@@ -87,7 +79,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     def step(self, action: ArrayLike) -> tuple[Float32, float, bool, bool, dict[str, Any]]:
         """One decision of the learner and of all others. Raises RuntimeError before a reset and after the end."""
         if not self._running:
-            raise RuntimeError("there is no episode to step; call reset() to start one")
+            raise RuntimeError("no episode is running; call reset() to start one")
         own = action_array(action, (2,), "the action")
         if not np.isfinite(own).all():
             raise ValueError(f"the action must be finite, got {own.tolist()}")

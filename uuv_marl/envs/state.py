@@ -1,4 +1,4 @@
-"""The global state for centralised critics: one flat vector of a world, and the table that explains it."""
+"""The global state for centralised critics: a flat vector for each world, and the table of its fields."""
 
 import numpy as np
 
@@ -65,6 +65,6 @@ def global_state(swarm: Swarm, layout: PerceptLayout) -> Float32:
     rows = [np.reshape(field, (swarm.num_worlds, -1)) for field in fields]
     flat = np.concatenate(rows, axis=1, dtype=np.float32, casting="same_kind")
     flat /= layout.scale
-    # np.clip takes three times as long.
+    # np.clip takes three times as long
     np.maximum(flat, layout.low, out=flat)
     return np.minimum(flat, layout.high, out=flat)

@@ -24,21 +24,20 @@ GROUP = "uuv"
 
 
 class SwarmEnv(EnvMixin, EnvBase):
-    """Worlds with batch size (num_worlds,), float32 and bool, on the CPU unless ``device`` says otherwise.
+    """Worlds with batch size (num_worlds,), in float32 and bool, on the CPU by default.
 
     Under ``uuv``: ``observation`` (vehicle, entry), ``mask`` (vehicle,), ``action`` (vehicle, 2), ``reward``
     (vehicle, 1), and ``done``, ``terminated``, ``truncated`` (vehicle, 1). At the root: ``state`` (entry,) for
-    centralised critics, and ``done``, ``terminated``, ``truncated`` (1,) of the world, by which TorchRL resets:
-    collectors and ``rollout`` reset a world when its episode ends, and no world otherwise. A lost vehicle stays
-    ``terminated``, its ``mask`` False, its observation and reward 0, until its world ends; mask it out of the loss.
+    centralised critics, and ``done``, ``terminated``, ``truncated`` (1,) of the world, by which collectors and
+    ``rollout`` reset it. A lost vehicle stays ``terminated``, its ``mask`` False, its observation and reward 0, until
+    its world ends; mask it out of the loss.
 
     Args:
         num_worlds: worlds stepped together.
         scenario: a name, a TOML file or a ``Scenario``.
-        seed: of the first reset, in which world w starts from ``seed + w``; as ``set_seed``.
-        device: where the tensors go; the simulation stays on the CPU.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period``,
-            ``overrides`` and ``for_policy``, as for ``uuv_marl.parallel_env``.
+        seed: of the first reset, ``seed + w`` for world w; as ``set_seed``.
+        device: of the tensors; the simulation runs on the CPU.
+        options: the other arguments of ``uuv_marl.parallel_env``, such as ``reward`` and ``for_policy``.
     """
 
     def __init__(
@@ -82,13 +81,13 @@ class SwarmEnv(EnvMixin, EnvBase):
         self.done_spec = nested(endings(*group), endings(*worlds))
 
     def _set_seed(self, seed: int | None) -> None:
-        """Each world starts from its seed when it is reset next."""
+        """Set the seeds of the worlds' next reset."""
         self._pending = world_seeds(seed, range(self.swarm.num_worlds))
 
     def _reset(
         self, tensordict: TensorDictBase | None = None, seed: int | None = None, **_kwargs: Any
     ) -> TensorDictBase:
-        """Start the worlds that ``_reset`` marks, default all; TorchRL takes only these from what is returned."""
+        """Start the worlds that ``_reset`` marks, by default all; TorchRL uses only these rows of the result."""
         if seed is not None:
             self._set_seed(seed)
         marked = None if tensordict is None else tensordict.get("_reset", None)
@@ -117,7 +116,7 @@ class SwarmEnv(EnvMixin, EnvBase):
         self, group: dict[str, NDArray[Any]], terminated: Bool, truncated: Bool, world_terminated: Bool,
         world_truncated: Bool,
     ) -> TensorDictBase:  # fmt: skip
-        """What stands under ``uuv``, as a tensordict, with the endings of vehicles (world, vehicle) and worlds."""
+        """The entries of ``uuv`` as a tensordict, with the endings of vehicles (world, vehicle) and worlds."""
         group |= _endings(terminated, truncated)
         root = {"state": self._batch.state(), **_endings(world_terminated, world_truncated)}
         batch = self.batch_size

@@ -26,22 +26,17 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
     """Worlds stepped together; ``vector_env`` makes them.
 
     Observations have shape (num_envs, vehicle, entry), actions (num_envs, vehicle, 2). A reward is the mean over a
-    world's vehicles. An episode terminates when the swarm has arrived or all its vehicles are lost; the time limit
-    truncates it. Gymnasium's ``autoreset_mode`` says what happens then:
+    world's vehicles. An episode terminates when the task is done or all vehicles are lost; the time limit truncates it.
+    Gymnasium's ``autoreset_mode`` then resets the world:
 
-    * ``SAME_STEP``: the world is reset in the step in which its episode ends. ``infos["final_obs"][world]`` is the last
-      observation. ``infos["final_info"]`` has the ending (``uuv_marl.envs.ending.ending``) and the last ``state``.
-    * ``NEXT_STEP``: the world is reset in the next step, which ignores the world's actions and gives the reward 0.
-    * ``DISABLED``: the world stays as it is, ``terminated`` and ``truncated`` too, until you reset it.
+    * ``SAME_STEP``: in the same step. ``infos["final_obs"][world]`` is the last observation; ``infos["final_info"]``
+      holds the ending (``uuv_marl.envs.ending.ending``) and the last ``state``.
+    * ``NEXT_STEP``: in the next step, which ignores the world's actions and returns the reward 0.
+    * ``DISABLED``: not at all; the world stays as it is, ``terminated`` and ``truncated`` too, until you reset it.
 
-    In the last two modes the last step returns the episode's last observation, and ``infos`` itself has the ending.
-
-    ``infos`` holds arrays of shape (num_envs, vehicle): ``agent_reward``, ``agent_terminated`` and ``agent_truncated``
-    of this step, and ``agent_mask``, the vehicles that act in the next step. Rows of lost vehicles are zero.
-
-    Args:
-        batch: the worlds.
-        render_mode, info_terms, autoreset_mode, render_options: as for ``vector_env``.
+    In the last two modes the last step returns the episode's last observation, and ``infos`` itself holds the ending.
+    ``infos`` has arrays of shape (num_envs, vehicle): ``agent_reward``, ``agent_terminated`` and ``agent_truncated`` of
+    this step, and ``agent_mask``, the vehicles that act in the next step. Rows of lost vehicles are zero.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own form
@@ -49,7 +44,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         "autoreset_mode": AutoresetMode.SAME_STEP,
         "render_modes": ["rgb_array"],
     }
-    closed = True  # until it is complete: Gymnasium closes what is dropped
+    closed = True  # until it is complete: Gymnasium closes what is deleted
 
     def __init__(
         self,
@@ -92,7 +87,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         return observation, _masked({"agent_mask": self.swarm.state.alive & ~self._batch.over[:, None]}, mask)
 
     def step(self, actions: ArrayLike) -> tuple[Float32, Float64, Bool, Bool, Infos]:
-        """One decision of every vehicle of every world, and the resets that ``autoreset_mode`` asks for."""
+        """One decision of every vehicle of every world, shape (num_envs, vehicle, 2), and resets."""
         result, due = self._batch.step(actions), self._due
         if due.any():
             result = result._replace(
@@ -125,7 +120,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         return _masked(infos, np.ones(self.num_envs, np.bool_))
 
     def _endings(self, observation: Float32, over: Bool) -> Infos:
-        """How worlds ended, before their reset."""
+        """The endings of worlds, before their reset."""
         infos: Infos = {}
         same_step, state = self.autoreset_mode is AutoresetMode.SAME_STEP, self._batch.state()
         for world in np.flatnonzero(over).tolist():
@@ -154,7 +149,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         return tuple(self._renderer.draw(world) for world in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - Gymnasium's signature
-        """Nothing shows a window here; frees the canvas."""
+        """Free the canvas."""
         self._renderer.close()
 
 
@@ -168,7 +163,7 @@ def _autoreset_mode(mode_name: AutoresetMode | str) -> AutoresetMode:
 
 
 def _masked(infos: Infos, mask: Bool) -> Infos:
-    """Gymnasium's form: every key with a mask of the worlds that have it."""
+    """The infos in Gymnasium's form: every key with a mask of the worlds that have it."""
     return infos | {f"_{key}": mask.copy() for key in infos}
 
 
@@ -184,8 +179,7 @@ def vector_env(
 ) -> SwarmVectorEnv:
     """A Gymnasium vector environment of ``num_envs`` worlds.
 
-    World w of ``reset(seed=s)`` is ``parallel_env().reset(seed=s + w)``, bit for bit, whatever the number of worlds and
-    threads.
+    World w of ``reset(seed=s)`` is ``parallel_env().reset(seed=s + w)``, bit for bit, for any number of worlds.
 
     Args:
         num_envs: worlds stepped together.
@@ -195,9 +189,8 @@ def vector_env(
         info_terms: put the reward's terms into the infos.
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its name; see
             ``SwarmVectorEnv``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period``,
-            ``overrides`` and ``for_policy``, as for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this
-            ``reward`` for each vehicle; the reward of a row is the mean over all vehicles, with ``team`` of ``dense``.
+        options: the other arguments of ``uuv_marl.parallel_env``, such as ``for_policy``. ``infos["agent_reward"]`` is
+            the ``reward`` of each vehicle; a row's is the mean over all vehicles, with ``team`` that of ``dense``.
     """
     batch = make_batched_env(scenario, num_envs, order=("num_envs", "scenario"), keep_terms=info_terms, **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)

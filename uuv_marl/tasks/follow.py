@@ -23,7 +23,6 @@ from uuv_marl.tasks.reward import StepReward, Terms
 from uuv_marl.tasks.task import Task
 from uuv_marl.types import Bool, Float64
 
-TRACKING, OBSTACLE, SPACING, EFFORT, COLLISION, LOSS, ARRIVAL, PROGRESS = range(8)
 _TERMS = {
     "tracking": "-w · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's distance to l(t)",
     "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
@@ -36,7 +35,8 @@ _TERMS = {
     "progress": "dense alone: Phi now - Phi before, with Phi = -min(d, D)/c, and 0 once the swarm has arrived; "
     "d: the vehicle's distance to l(t), D: progress_far_m, c: progress_m",
 }
-"""Each term of ``dense``; ``sparse`` has all but the last."""
+"""Each term of ``dense``, in the compiled order; ``sparse`` has all but the last."""
+PROGRESS = len(_TERMS) - 1
 
 
 class Follow(Task):
@@ -168,9 +168,8 @@ def _fill(
             progress = (min(facts.away_before[w, i], far) - left) / weights.progress_m
         reward[w, i] = 0.0 + tracking + obstacle + spacing + effort + collision + loss + arrival + progress
         if store_terms:
-            terms[TRACKING, w, i], terms[OBSTACLE, w, i], terms[SPACING, w, i] = tracking, obstacle, spacing
-            terms[EFFORT, w, i], terms[COLLISION, w, i], terms[LOSS, w, i] = effort, collision, loss
-            terms[ARRIVAL, w, i] = arrival
+            for k, term in enumerate((tracking, obstacle, spacing, effort, collision, loss, arrival)):
+                terms[k, w, i] = term
             if dense:
                 terms[PROGRESS, w, i] = progress
 

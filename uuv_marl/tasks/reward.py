@@ -32,16 +32,10 @@ class StepReward(NamedTuple):
 
 
 def from_terms(owner: str, names: Sequence[str], give: Callable[[], Terms], swarm: Swarm, running: Bool) -> StepReward:
-    """The reward of terms by name, weighted already, shape (world, vehicle) each.
+    """The reward of ``running`` worlds, shape (world,), from weighted terms by name, shape (world, vehicle) each.
 
-    ``fill`` raises RewardError if terms are missing or unknown, of another shape, or not finite.
-
-    Args:
-        owner: class of the task, for errors.
-        names: the terms that it declares, in order.
-        give: gives the terms after the step.
-        swarm: before the step.
-        running: worlds that are stepped, shape (world,).
+    ``give`` returns the terms after the step; ``fill`` raises RewardError unless they are those that the class
+    ``owner`` declares, finite and of this shape.
     """
     shape = (swarm.num_worlds, swarm.num_vehicles)
     total, terms = np.zeros(shape), np.zeros((len(names), *shape))

@@ -80,20 +80,14 @@ class SilentTargetsMemory(NamedTuple):
 
 @compiled
 def walk(
-    worlds: Bool, time_s: Float64, period: float, half: float, rate: float, places: Float64, memory: SilentTargetsMemory,
-    velocity: Float64,
+    worlds: Bool, time_s: Float64, period: float, half: float, rate: float, places: Float64,
+    memory: SilentTargetsMemory, velocity: Float64,
 ) -> None:  # fmt: skip
-    """Fill the targets' velocities for the coming step; one that would leave the box is reflected at its edge.
+    """Fill the targets' velocities for the coming step; one that would leave the box is reflected.
 
-    Args:
-        worlds: worlds that are stepped, shape (world,).
-        time_s: since the reset, shape (world,).
-        period: duration of a step [s].
-        half: half of the box's side [m].
-        rate: turn rate [rad/s].
-        places: north and east [m], shape (world, target, at least 2).
-        memory: the task's memory, which is changed.
-        velocity: north and east [m/s], shape (world, target, 2).
+    ``worlds`` are stepped, ``time_s`` is since the reset, shape (world,) both; ``period`` of a step [s], ``half`` of
+    the box's side [m], turn ``rate`` [rad/s]; ``places`` [m] and ``velocity`` [m/s], north and east, shape (world,
+    target, at least 2); ``memory`` is changed.
     """
     for w in range(memory.speed.shape[0]):
         for k in range(memory.speed.shape[1] if worlds[w] else 0):

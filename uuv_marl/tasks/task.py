@@ -85,7 +85,7 @@ class Task(RequiredMethods):
     ending: ClassVar[str] = "done"
     """Name of the ending of an episode that is ``done``."""
     reference_policy: ClassVar[str] = "bio_inspired"
-    """Policy whose mean return is above that of ``idle`` and ``random``."""
+    """A policy with a mean return above that of ``idle`` and ``random``."""
 
     def __init__(self, swarm: Swarm) -> None:
         self.swarm = swarm

@@ -67,19 +67,6 @@ class TwoSwarmsNumbers(ReachNumbers):
                 f"{self.half_width_m:g}, got {least:g} for it"
             )
 
-    def check_space(self, hull_radius: float, length: float) -> None:
-        """Raise ScenarioError if hulls of this radius don't fit through, or groups of this length start in the wall."""
-        if self.gap_m[0] <= 2.0 * hull_radius:
-            raise ScenarioError(
-                f"task.gap_m must be above {2.0 * hull_radius:g}, twice collision.hull_radius_m, got "
-                f"{list(self.gap_m)}; widen it"
-            )
-        if self.apart_m < (least := 0.5 * length + self.radius_m + hull_radius):
-            raise ScenarioError(
-                f"task.apart_m must be at least {least:g}, so that groups {length:g} m long start before the wall, "
-                f"got {self.apart_m:g}; raise it, or shrink start"
-            )
-
     def discs(self, gap: float, at: float) -> Float64:
         """Wall and banks around the wall's middle: x ahead, y along the wall and radius [m], shape (disc, 3)."""
         end, beyond, radius = self.half_width_m + INTO_BANK_M, self.apart_m + self.behind_m, self.radius_m
@@ -124,7 +111,17 @@ class TwoSwarms(Reach):
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
         numbers, (length, width) = self.numbers, swarm.scenario.start.sides(swarm.num_vehicles)
-        numbers.check_space(swarm.scenario.collision.hull_radius_m, length)
+        hull = swarm.scenario.collision.hull_radius_m
+        if numbers.gap_m[0] <= 2.0 * hull:
+            raise ScenarioError(
+                f"task.gap_m must be above {2.0 * hull:g}, twice collision.hull_radius_m, got {list(numbers.gap_m)}; "
+                "widen it"
+            )
+        if numbers.apart_m < (least := 0.5 * length + numbers.radius_m + hull):
+            raise ScenarioError(
+                f"task.apart_m must be at least {least:g}, so that groups {length:g} m long start before the wall, "
+                f"got {numbers.apart_m:g}; raise it, or shrink start"
+            )
         if length / 2 > numbers.behind_m or width / 2 + numbers.aside_m > numbers.half_width_m:
             raise ScenarioError(
                 f"the groups must start within the banks of task 'two_swarms': {length:g} x {width:g} m each, moved by "

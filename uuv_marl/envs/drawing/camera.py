@@ -1,4 +1,4 @@
-"""Where metres are on a picture: north up, east right."""
+"""The camera: from metres to pixels, north up, east right."""
 
 import math
 from collections.abc import Sequence
@@ -10,27 +10,27 @@ from uuv_marl.envs.drawing.scene import Float, Scene
 from uuv_marl.scenario import Scenario
 
 CAMERAS = ("follow", "map")
-"""``follow`` keeps the swarm and l(t) in view, ``map`` the whole course."""
+"""``follow`` keeps the swarm and l(t) in view, ``map`` the whole map."""
 _MARGIN = 0.12
-"""Share of the picture that stays free on each side."""
+"""Margin on each side, as a share of the picture."""
 _LEAST_M = 80.0
-"""What a camera that follows shows at least."""
+"""Least extent of the view of a camera that follows."""
 _STRAY = 3.0
-"""Vehicles this many s_l from l(t), and from the swarm's middle, may leave the view of a camera that follows."""
+"""Distance from l(t) and from the swarm's middle, in s_l, beyond which a camera that follows ignores vehicles."""
 
 
 class Camera(NamedTuple):
     """A view."""
 
     centre: Float
-    """What is in the middle of the picture: north, east [m], shape (2,)."""
+    """Middle of the picture: north, east [m], shape (2,)."""
     scale: float
     """Pixels per metre."""
     size: tuple[int, int]
     """Width and height [px]."""
 
     def pixels(self, points: Float) -> Float:
-        """Where points (..., north and east [m]) are on the picture: (..., right and down [px])."""
+        """Points (..., north and east [m]) on the picture, (..., right and down [px])."""
         offset = (points - self.centre) * self.scale
         return np.stack([self.size[0] / 2 + offset[..., 1], self.size[1] / 2 - offset[..., 0]], axis=-1)
 
@@ -40,25 +40,25 @@ class Camera(NamedTuple):
         return np.array([self.size[1], self.size[0]]) / (2.0 * self.scale)
 
     def magnified(self, factor: int) -> "Camera":
-        """The same view on a picture that is larger."""
+        """The same view on a larger picture."""
         return Camera(self.centre, self.scale * factor, (self.size[0] * factor, self.size[1] * factor))
 
 
 def aim(kind: str, scenes: Sequence[Scene], size: tuple[int, int]) -> Camera:
-    """One of ``CAMERAS`` for a picture of this size [px]; where several scenes are shown, the same for all."""
+    """One of ``CAMERAS`` for a picture of this size [px], the same for all scenes."""
     if kind == "map":
         return _around(np.concatenate([_map_bounds(scene) for scene in scenes]), size)
     return _around(np.concatenate([_swarm(scene) for scene in scenes]), size, _LEAST_M)
 
 
 def nice(length: float) -> float:
-    """The smallest of 1, 2, 5, 10, 20, ... that is no shorter."""
+    """The smallest of 1, 2, 5, 10, 20, ... from this length on."""
     power = 10.0 ** math.floor(math.log10(length))
     return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= length * (1.0 - 1e-9))
 
 
 def shown_speed(scenario: Scenario) -> float:
-    """A round speed [m/s] of which a picture tells how long an arrow of the current is."""
+    """A round speed [m/s] for the scale of the current's arrows."""
     current = scenario.current
     return nice(max(current.speed_mps, current.variation_mps, current.eddy_speed_mps if current.eddies else 0.0))
 
@@ -79,7 +79,7 @@ def _swarm(scene: Scene) -> Float:
 
 
 def _map_bounds(scene: Scene) -> Float:
-    """Trajectory and obstacles, with room for the swarm that starts behind and swings around them."""
+    """Corners of trajectory, obstacles and start, with a margin for the swarm, shape (corner, 2)."""
     start, n = scene.scenario.start, scene.scenario.swarm.num_vehicles
     length, width = start.sides(n)
     ahead = scene.waypoints[1] - scene.waypoints[0]

@@ -11,13 +11,13 @@ with extra("render", "rendering"):
     import pygame
 
 ARROW = 20.0
-"""Length of an arrow of the ``shown_speed`` in a picture of the usual size [px]."""
+"""Length of an arrow at ``shown_speed`` in a picture of the usual size [px]."""
 _MOST, _LEAST = 1.6, 0.08
-"""Arrows get no longer than so many times this, and those below so many are left out."""
+"""Longest arrow, and the shortest one that is drawn, relative to ``ARROW``."""
 
 
 def paint_current(surface: pygame.Surface, scene: Scene, view: Camera, cell: float, unit: float) -> None:
-    """Four arrows in every cell of the grid, of this side [m], which stay where they are while the view moves."""
+    """Four arrows in every cell of the grid, with this side [m], fixed to the map."""
     if scene.water is None:
         return
     apart = cell / 2.0

@@ -1,4 +1,4 @@
-"""Whole frames: the water of one or more scenes side by side, each under its numbers, above a common legend."""
+"""Frames: one or more scenes side by side, each below its numbers, above a common legend."""
 
 import math
 from collections.abc import Sequence
@@ -26,11 +26,11 @@ class Panel(NamedTuple):
     title: str
     scene: Scene
     clock: float = 0.0
-    """Panels of one clock show the same part of the water."""
+    """Panels with the same clock share a view."""
 
 
 class Frame:
-    """Draws panels into a picture of this size [px], so many of them side by side."""
+    """Draws panels into a picture of this size [px], in so many columns."""
 
     def __init__(self, size: tuple[int, int], columns: int = 1, *, grid: bool = True) -> None:
         self.size, self._columns, self._grid = size, columns, grid
@@ -40,7 +40,7 @@ class Frame:
         self._laid: tuple[int, ...] = ()
 
     def draw(self, panels: Sequence[Panel], camera: str, heading: str = "") -> pygame.Surface:
-        """The picture, panels by row, below a heading where there is one; the next call draws over it."""
+        """The picture, panels by row, below the heading if there is one; the next call overwrites it."""
         self._lay_out(panels, heading)
         self._surface.fill(ink.WHITE)
         ink.write(self._surface, heading, (_PAD, 5 * self._unit), round(13 * self._unit), ink.QUIET)
@@ -64,7 +64,7 @@ class Frame:
         return self._surface
 
     def _lay_out(self, panels: Sequence[Panel], heading: str) -> None:
-        """Cells for the panels, above them room for the heading, below them for the legend where it takes little."""
+        """Cells for the panels, space for the heading above, and for the legend below if it is small."""
         below = round(20 * self._unit) * legend_rows(self.size[0], panels[0].scene, self._text) + 4
         laid = len(panels), below, len(heading) > 0
         if self._laid == laid:
@@ -96,13 +96,13 @@ class Frame:
 
 
 def pixels(surface: pygame.Surface) -> NDArray[np.uint8]:
-    """A picture as an array of its own, shape (height, width, 3)."""
+    """A copy of a picture as an array, shape (height, width, 3)."""
     width, height = surface.get_size()
     return np.frombuffer(bytearray(pygame.image.tobytes(surface, "RGB")), np.uint8).reshape(height, width, 3)
 
 
 def _numbers(scene: Scene) -> list[tuple[str, str, str, ink.Colour]]:
-    """Label, short label, value and colour of what a header tells."""
+    """Label, short label, value and colour of each number in a header."""
     limits, contact = scene.scenario.constraints, scene.scenario.collision.hull_radius_m
 
     def distance(value: float, least: float, touching: float) -> tuple[str, ink.Colour]:

@@ -1,4 +1,4 @@
-"""What all drawn frames share: colours and text."""
+"""Colours and text of drawn frames."""
 
 import functools
 from pathlib import Path
@@ -20,7 +20,7 @@ WHITE, WATER, GRID = (255, 255, 255), (246, 250, 252), (222, 231, 236)
 PASSIVE, ACTIVE, EDGE = (250, 243, 248), (246, 226, 238), (232, 210, 224)
 TEXT, QUIET, TRACK = (33, 41, 48), (96, 108, 118), (70, 80, 88)
 CURRENT = (146, 155, 163)
-"""QUIET, a third of the way to WATER, as ``palette`` has it."""
+"""QUIET, mixed with a third of WATER, as in ``palette``."""
 DISC, KEEP_OUT, LOST = (115, 115, 115), (165, 165, 165), (140, 140, 140)
 TRAILS: tuple[Colour, ...] = ((222, 234, 243), (200, 221, 236), (174, 207, 228), (145, 190, 219))
 """Colours of trails, from the oldest to the newest part."""
@@ -31,7 +31,7 @@ TEAM_TRAILS = [TRAILS, *(np.rint(WATER + _SHARES * np.subtract(TEAMS[k], WATER))
 
 
 def palette() -> list[Colour]:
-    """Colours that a picture can do with: all but trails, and how strong ones fade into the water."""
+    """Colours of a picture but those of trails, with steps of strong colours towards the water's."""
     strong = (BLUE, ORANGE, GREEN, PINK, AMBER, TEXT, QUIET, DISC)
 
     def mixed(colour: Colour, k: int) -> Colour:
@@ -44,7 +44,7 @@ def palette() -> list[Colour]:
 
 @functools.cache
 def _font(height: int, bold: bool) -> pygame.font.Font:
-    """DejaVu Sans, which Matplotlib brings and the figures use."""
+    """DejaVu Sans from Matplotlib, as in the figures."""
     pygame.font.init()
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     return pygame.font.Font(Path(mpl.get_data_path()) / "fonts" / "ttf" / name, height)
@@ -58,9 +58,9 @@ def text(words: str, height: int, colour: Colour = TEXT, bold: bool = False) -> 
     return _font(height, bold).render(words, True, colour)
 
 
-def fitting(words: str, width: float, height: int, *, bold: bool = False) -> str:
-    """These words, or where there is less room [px] an ellipsis and their end, as of a long path."""
-    parts = [words, *(f"…{words[k:]}" for k in range(1, len(words)))]
+def fitting(words: str, width: float, height: int, *, bold: bool = False, start: bool = False) -> str:
+    """These words, or as much of their end (or ``start``) as fits into this width [px], with an ellipsis."""
+    parts = [words, *(f"{words[:-k]}…" if start else f"…{words[k:]}" for k in range(1, len(words)))]
     return next((part for part in parts if text(part, height, bold=bold).get_width() <= width), "…")
 
 

@@ -1,4 +1,4 @@
-"""The legend of a frame: a sign and a word for everything that is drawn."""
+"""The legend of a frame: a sign and words for everything that is drawn."""
 
 from collections.abc import Callable
 
@@ -16,7 +16,7 @@ with extra("render", "rendering"):
     import pygame
 
 Sign = Callable[[pygame.Surface, float], object]
-"""Draws into a fine surface of 24 x 16 units of so many pixels."""
+"""Draws into a fine surface of 24 x 16 units, each of so many pixels."""
 WIDE, HIGH = 24, 16
 
 
@@ -26,20 +26,27 @@ def _water(scene: Scene) -> list[tuple[str, Sign]]:
     alone = "vehicle" if all_know else "perceives l(t)"
     signs = [(f"group {k + 1}" if len(teams) > 1 else alone, _dart(ink.TEAMS[k])) for k in teams]
     if not all_know:
-        signs.append(("does not perceive l(t)", lambda *on: (_dart(ink.BLUE)(*on), _dart(ink.WHITE, 7.5)(*on))))
+        signs.append(("does not perceive l(t)", _all(_dart(ink.BLUE), _dart(ink.WHITE, 7.5))))
     task = scene.scenario.task_class
-    signs.append((task.reference_label, _target if scene.followed_paths else _goal))
+    signs.append(
+        (
+            task.reference_label,
+            _all(_circle(ink.GREEN, width=2.0), _circle(ink.GREEN, 2.0)) if scene.followed_paths else _goal,
+        )
+    )
     if len(scene.marks):
-        signs.append((task.mark_label or "of the task", _mark))
+        signs.append((task.mark_label or "of the task", _circle(ink.AMBER, width=1.0)))
     if scene.trail.size:
         signs.append((f"last {TRAIL_S:g} s", _trail))
     near = f"nearer than {limits.s_u_m:g} m"
     if scene.obstacles.size:
-        signs.append((f"obstacle, s_o = {limits.s_o_m:g} m", _disc))
+        signs.append(
+            (f"obstacle, s_o = {limits.s_o_m:g} m", _all(_circle(ink.KEEP_OUT, width=0.5), _circle(ink.DISC, 5.0)))
+        )
         near += "" if limits.s_o_m == limits.s_u_m else f", obstacle {limits.s_o_m:g} m"
-    signs += [(near, _dart(ink.AMBER)), ("collision", _hit)]
+    signs += [(near, _dart(ink.AMBER)), ("collision", _all(_cross(ink.ORANGE, 3.0), _circle(ink.ORANGE, width=1.5)))]
     if scene.scenario.loses_vehicles:
-        signs.append(("lost", _lost))
+        signs.append(("lost", _cross(ink.LOST, 3.5)))
     if scene.water is not None:
         signs.append((f"current, {shown_speed(scene.scenario):g} m/s", _current))
     return signs
@@ -48,17 +55,21 @@ def _water(scene: Scene) -> list[tuple[str, Sign]]:
 def _sonar(scene: Scene) -> list[tuple[str, Sign]]:
     if scene.sonar is None:
         return []
-    signs = [("active sonar", _patch(ink.ACTIVE)), ("passive sonar", _patch(ink.PASSIVE)), ("hears", _detection_sign)]
+    signs = [
+        ("active sonar", _patch(ink.ACTIVE)),
+        ("passive sonar", _patch(ink.PASSIVE)),
+        ("detection", _detection_sign),
+    ]
     return [*signs, ("echo", _echo)] if scene.obstacles.size else signs
 
 
 def legend_rows(width: int, scene: Scene, height: int) -> int:
-    """How many rows a scene's legend takes in this width, with letters of this height [px]."""
+    """Rows of a scene's legend in this width, with letters of this height [px]."""
     return 1 + max(row for row, *_ in _flow(width, scene, height))
 
 
 def draw_legend(surface: pygame.Surface, area: pygame.Rect, scene: Scene, height: int) -> None:
-    """Draw a scene's legend in an area with room for its ``legend_rows`` [px]."""
+    """Draw a scene's legend in an area that holds its ``legend_rows`` [px]."""
     unit = height / 12.0
     for row, x, words, sign in _flow(area.width, scene, height):
         y = area.top + (3 + 20 * row) * unit
@@ -71,7 +82,7 @@ def draw_legend(surface: pygame.Surface, area: pygame.Rect, scene: Scene, height
 def _flow(width: int, scene: Scene, height: int) -> list[tuple[int, float, str, Sign | None]]:
     """Row, left end, word and sign.
 
-    Where one row is not enough, the sonar has its own. What disturbs the vehicles stands below, in words alone.
+    The sonar has a row of its own unless one is enough for all; disturbances follow below, as text.
     """
     unit, signs = height / 12.0, [*_water(scene), *_sonar(scene)]
     wide = [(WIDE + 18) * unit + ink.text(words, height).get_width() for words, _ in signs]
@@ -83,17 +94,9 @@ def _flow(width: int, scene: Scene, height: int) -> list[tuple[int, float, str, 
         flown.append((row, x, words, sign))
         x += wide[k]
     if disturbances(scene.scenario):
-        flown.append((row + 1, 8 * unit, _cut(f"sea: {conditions(scene.scenario)}", width - 16 * unit, height), None))
+        words = f"disturbances: {conditions(scene.scenario)}"
+        flown.append((row + 1, 8 * unit, ink.fitting(words, width - 16 * unit, height, start=True), None))
     return flown
-
-
-def _cut(words: str, width: float, height: int) -> str:
-    """As much of a text as fits into a width [px]."""
-    if ink.text(words, height).get_width() <= width:
-        return words
-    while words and ink.text(f"{words}…", height).get_width() > width:
-        words = words[:-1]
-    return f"{words}…"
 
 
 def _drawn(sign: Sign, unit: float) -> pygame.Surface:
@@ -116,27 +119,22 @@ def _trail(fine: pygame.Surface, unit: float) -> None:
         pygame.draw.line(fine, colour, (5.0 * k * unit, 8.0 * unit), (5.0 * (k + 1) * unit, 8.0 * unit), round(unit))
 
 
-def _disc(fine: pygame.Surface, unit: float) -> None:
-    pygame.draw.circle(fine, ink.KEEP_OUT, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(unit / 2))
-    pygame.draw.circle(fine, ink.DISC, (12.0 * unit, 8.0 * unit), 5.0 * unit)
+def _circle(colour: ink.Colour, radius: float = 7.5, width: float = 0.0) -> Sign:
+    """A circle, filled if it has no width."""
+    return lambda fine, unit: pygame.draw.circle(
+        fine, colour, (12.0 * unit, 8.0 * unit), radius * unit, round(width * unit)
+    )
 
 
-def _target(fine: pygame.Surface, unit: float) -> None:
-    pygame.draw.circle(fine, ink.GREEN, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(2.0 * unit))
-    pygame.draw.circle(fine, ink.GREEN, (12.0 * unit, 8.0 * unit), 2.0 * unit)
+def _cross(colour: ink.Colour, size: float) -> Sign:
+    return lambda fine, unit: diagonal_cross(
+        fine, np.array([12.0, 8.0]) * unit, size * unit, colour, round(0.8 * unit) * 2
+    )
 
 
-def _mark(fine: pygame.Surface, unit: float) -> None:
-    pygame.draw.circle(fine, ink.AMBER, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(unit))
-
-
-def _hit(fine: pygame.Surface, unit: float) -> None:
-    diagonal_cross(fine, np.array([12.0, 8.0]) * unit, 3.0 * unit, ink.ORANGE, round(0.8 * unit) * 2)
-    pygame.draw.circle(fine, ink.ORANGE, (12.0 * unit, 8.0 * unit), 7.5 * unit, round(1.5 * unit))
-
-
-def _lost(fine: pygame.Surface, unit: float) -> None:
-    diagonal_cross(fine, np.array([12.0, 8.0]) * unit, 3.5 * unit, ink.LOST, round(0.8 * unit) * 2)
+def _all(*signs: Sign) -> Sign:
+    """Signs on top of each other."""
+    return lambda fine, unit: [sign(fine, unit) for sign in signs]
 
 
 def _current(fine: pygame.Surface, unit: float) -> None:

@@ -1,4 +1,4 @@
-"""What a user chooses about the pictures of an environment."""
+"""Options of an environment's pictures."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple, TypedDict
@@ -16,10 +16,9 @@ class RenderOptions(TypedDict, total=False):
     size: tuple[int, int]
     """Width and height of a picture or the window [px], 800 x 800 by default."""
     camera: Literal["follow", "map"]
-    """``follow`` (the default) keeps the swarm and l(t) in view, with the whole course in a corner; ``map`` shows the
-    whole course."""
+    """``follow`` (the default) keeps the swarm and l(t) in view, with the map in a corner; ``map`` shows the map."""
     sonar_of: int | None
-    """Index of the vehicle whose sonar is drawn: its arrays, whom it hears, its echoes. None by default."""
+    """Index of a vehicle, to draw its sonar arrays, detections and echoes. None by default."""
 
 
 class Look(NamedTuple):
@@ -31,11 +30,7 @@ class Look(NamedTuple):
 
 
 def look(options: RenderOptions | None, num_vehicles: int, sonar_of: int | None = None) -> Look:
-    """The checked options; ``sonar_of`` where they name no vehicle.
-
-    Raises:
-        ValueError: one can't be used; the message names it, its value and what it may be.
-    """
+    """The checked options, with this ``sonar_of`` by default. Raises ValueError for what can't be used."""
     options_given: Any = {} if options is None else options
     if not isinstance(options_given, Mapping):
         raise ValueError(f"render_options must be a dictionary such as {{'camera': 'map'}}, got {options_given!r}")

@@ -1,6 +1,6 @@
-"""Paints the water of a scene: course, vehicles, trails, collisions and the sonar of one vehicle, seen from above.
+"""Paints a scene from above: map, vehicles, trails, collisions and the sonar of one vehicle.
 
-Everything but words is drawn at twice the size and scaled down, so that edges are smooth.
+Everything but text is drawn at twice the size and scaled down, so that edges are smooth.
 """
 
 import math
@@ -19,26 +19,26 @@ with extra("render", "rendering"):
     import pygame
 
 FINE = 2
-"""Pixels drawn for one that is shown, each way."""
+"""Pixels drawn for each that is shown, in both directions."""
 FRESH_S = 3.0
-"""A collision younger than this [s] has a ring around it."""
+"""Age of a collision up to which it has a ring around it [s]."""
 _GRID_PX, _CHEVRON_PX = 70, 110
 DART = np.array([[0.6, 0.0], [-0.4, 0.34], [-0.2, 0.0], [-0.4, -0.34]])
 """A vehicle of length 1, the bow at the front."""
 
 
 class Painter:
-    """Paints water of this size [px], with a grid of lines that tell how the view moves unless it is left out."""
+    """Paints pictures of this size [px], with or without a grid of lines."""
 
     def __init__(self, size: tuple[int, int], *, grid: bool = True) -> None:
         self.size, self._lines = size, grid
         self._fine = pygame.Surface((size[0] * FINE, size[1] * FINE), depth=32)
         self._shown = pygame.Surface(size, depth=32)
         self._unit = FINE * max(1.0, min(size) / 800.0)
-        """Fine pixels in one of a picture of the usual size."""
+        """Fine pixels per pixel of a picture of the usual size."""
 
     def paint(self, scene: Scene, camera: Camera) -> pygame.Surface:
-        """The picture; the next call paints over it."""
+        """The picture; the next call overwrites it."""
         view = camera.magnified(FINE)
         self._fine.fill(ink.WATER)
         if scene.sonar:
@@ -60,7 +60,7 @@ class Painter:
         return self._shown
 
     def glimpse(self, scene: Scene, camera: Camera, seen: Camera) -> pygame.Surface:
-        """The whole course in small, with the rectangle that another camera shows."""
+        """The map in small, with the rectangle that another camera shows."""
         view = camera.magnified(FINE)
         self._fine.fill(ink.WATER)
         self._discs(scene, view)
@@ -79,7 +79,7 @@ class Painter:
         return pygame.transform.smoothscale(self._fine, self.size, self._shown)
 
     def _grid(self, view: Camera, cell: float) -> None:
-        """Lines of one shown pixel, which scaling down leaves crisp."""
+        """Lines one shown pixel wide, which stay sharp when scaled down."""
         low, high = view.centre - view.reach, view.centre + view.reach
         width, height = view.size
         for axis in (0, 1):
@@ -88,7 +88,7 @@ class Painter:
                 self._fine.fill(ink.GRID, (0, at, width, FINE) if axis == 0 else (at, 0, FINE, height))
 
     def _draw_paths(self, scene: Scene, view: Camera) -> None:
-        """Obstacles, each group's trajectory with its direction and start, goals."""
+        """Obstacles, each group's trajectory with its direction and start, and goals."""
         self._discs(scene, view)
         unit = self._unit
         spacing = nice(_CHEVRON_PX * unit / view.scale) * view.scale
@@ -119,9 +119,8 @@ class Painter:
 
     def _goals(self, scene: Scene, view: Camera, size: float) -> None:
         for team, path in scene.groups.paths.values():
-            star(
-                self._fine, view.pixels(path[-1]), size if len(path) > 1 else size / 2.0, ink.TEAMS.get(team, ink.AMBER)
-            )
+            radius = size if len(path) > 1 else size / 2.0
+            star(self._fine, view.pixels(path[-1]), radius, ink.TEAMS.get(team, ink.AMBER))
 
     def _trails(self, scene: Scene, view: Camera) -> None:
         places = view.pixels(np.concatenate([scene.trail, scene.position[None]])[:, scene.alive])
@@ -131,7 +130,7 @@ class Painter:
                 pygame.draw.lines(self._fine, ink.TEAM_TRAILS[team][k], False, line, FINE)
 
     def _vehicles(self, scene: Scene, view: Camera) -> None:
-        """Darts as long as s_u: two that overlap are too near; longer where else specks, hollow for the uninformed."""
+        """Darts of length s_u, so that two that overlap are too near, longer in large views; hollow if uninformed."""
         unit, apart = self._unit, scene.scenario.start.spacing_m * view.scale
         least = max(min(6.0 * unit, 0.75 * apart), 3.0 * unit)
         length = min(max(scene.scenario.constraints.s_u_m * view.scale, least), 22.0 * unit)
@@ -152,7 +151,7 @@ class Painter:
             pygame.draw.circle(self._fine, ink.PINK, places[i].tolist(), 0.8 * length + 3 * unit, round(1.5 * unit))
 
     def _hits(self, scene: Scene, view: Camera) -> None:
-        """A cross wherever vehicles collided, and a ring around it while it is fresh."""
+        """A cross at every collision, with a ring while it is new."""
         unit = self._unit
         for place, when in zip(view.pixels(scene.hits[:, :2]), scene.hits[:, 2], strict=True):
             diagonal_cross(self._fine, place, 4.0 * unit, ink.ORANGE, round(2.0 * unit))
@@ -168,7 +167,7 @@ class Painter:
                 pygame.draw.circle(self._fine, colour, at, (2.4 + wider) * unit)
 
     def _bar(self, view: Camera, cell: float) -> None:
-        """The scale bar, as long as a cell of the grid, and beside it the arrow to the north."""
+        """The scale bar, as long as a cell of the grid, and the north arrow."""
         unit = self._unit
         right, low, long = view.size[0] - 34.0 * unit, view.size[1] - 10.0 * unit, cell * view.scale
         ticks = [(right - long, low - 5 * unit), (right - long, low), (right, low), (right, low - 5 * unit)]
@@ -185,7 +184,7 @@ class Painter:
                 x, y = camera.pixels(point).tolist()
                 left = x - ink.text(words, height, bold=True).get_width() / 2
                 ink.write(self._shown, words, (left, y + 13 * unit), height, bold=True, halo=True)
-            if scene.place != "goal":  # whose word is there
+            if scene.place != "goal":
                 (x, y), colour = camera.pixels(reference).tolist(), ink.TEAMS.get(team, ink.GREEN)
                 ink.write(self._shown, scene.place, (x + 15 * unit, y - 7 * unit), height, colour, bold=True, halo=True)
         right, low = self.size[0], self.size[1] - 9 * unit - height
@@ -196,7 +195,7 @@ class Painter:
 
 
 def star(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour) -> None:
-    """A star with five points at this distance [px], with an edge if it is amber."""
+    """A star of this radius [px], with an edge if it is amber."""
     angles = np.arange(10) * math.pi / 5.0
     radii = np.where(np.arange(10) % 2, 0.42, 1.0)[:, None] * size
     points = (at + radii * np.stack([np.sin(angles), -np.cos(angles)], axis=1)).tolist()
@@ -205,7 +204,7 @@ def star(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour) ->
 
 
 def diagonal_cross(surface: pygame.Surface, at: Float, size: float, colour: ink.Colour, width: int) -> None:
-    """A diagonal cross of half this width ``size`` and lines of this ``width`` [px]."""
+    """A diagonal cross of half width ``size``, with lines of this ``width`` [px]."""
     for slope in (1.0, -1.0):
         start, end = (at + size * np.array([[-1.0, -slope], [1.0, slope]])).tolist()
         pygame.draw.line(surface, colour, start, end, width)

@@ -1,4 +1,4 @@
-"""A scene: what there is to draw of one world at one moment, whether it happens now or was recorded."""
+"""A scene: the content of a picture of one world at one moment, live or recorded."""
 
 from collections import deque
 from typing import NamedTuple
@@ -15,15 +15,15 @@ from uuv_marl.types import Bool
 Float = NDArray[np.floating]
 
 TRAIL_S = 20.0
-"""How long a trail is [s]."""
+"""Duration of a trail [s]."""
 
 
 class SonarView(NamedTuple):
-    """What one vehicle's sonar tells it."""
+    """The sonar percept of one vehicle."""
 
     vehicle: int
     neighbour: Float
-    """Positions of the vehicles that it hears, in its body frame [m], shape (heard, 2)."""
+    """Positions of detected vehicles in its body frame [m], shape (detected, 2)."""
     echo_range: Float
     """Range to the nearest obstacle in each active sub-sector [m], 0 for none, shape (active,)."""
 
@@ -35,7 +35,6 @@ class Scene(NamedTuple):
     waypoints: Float
     """Corners of the first group's trajectory, shape (point, 2)."""
     groups: Groups
-    """Who goes where, and who knows of it."""
     obstacles: Float
     """Centre north, east and radius, shape (obstacle, 3)."""
     marks: Float
@@ -44,7 +43,7 @@ class Scene(NamedTuple):
     references: Float
     """Position of each group's l(t), shape (group, 2)."""
     position: Float
-    """Position of every vehicle; a lost one stays where it was lost, shape (vehicle, 2)."""
+    """Position of every vehicle, for a lost one its last, shape (vehicle, 2)."""
     heading: Float
     """Clockwise from north [rad], shape (vehicle,)."""
     alive: Bool
@@ -52,36 +51,36 @@ class Scene(NamedTuple):
     near: Bool
     """Nearer than s_u to another vehicle, or than s_o to an obstacle, shape (vehicle,)."""
     trail: Float
-    """Where everybody was, the oldest first, shape (sample, vehicle, 2)."""
+    """Past positions, the oldest first, shape (sample, vehicle, 2)."""
     hits: Float
     """Collisions so far: north, east and time [s], shape (hit, 3)."""
     arrival_s: float | None
-    """When the swarm arrived, None before."""
+    """Time of the swarm's arrival, None before."""
     collisions: int
     """Collisions so far."""
     min_spacing_m: float
-    """Smallest distance between two vehicles; infinite for one alone."""
+    """Smallest distance between two vehicles; infinite for a single one."""
     clearance_m: float
     """Smallest distance of a vehicle to an obstacle's surface; infinite without obstacles."""
     centre_error_m: float
-    """Distance of the swarm's centre to l(t)."""
+    """Distance of the swarm's centre from l(t)."""
     sonar: SonarView | None
     water: FlowField | None
-    """How it moves; None where the scenario's water is still."""
+    """The current; None if the scenario has none."""
 
     @property
     def place(self) -> str:
-        """What a reference is called, such as ``l(t)``."""
+        """Name of a reference, such as ``l(t)``."""
         return self.scenario.task_class.reference_label.partition(",")[0]
 
     @property
     def followed_paths(self) -> list[tuple[int | None, Float, Float]]:
-        """Team, corners and l(t) of each group, but for goals at rest of several groups."""
+        """Team, corners and l(t) of each group with a trajectory."""
         return [(team, path, self.references[g]) for g, (team, path) in self.groups.paths.items() if len(path) > 1]
 
 
 class SceneHistory:
-    """What a scene shows of the past: trails and collisions of every world, as far as the steps were noted."""
+    """Trails and collisions of every world, from the steps that were noted."""
 
     def __init__(self, batch: BatchedEnv) -> None:
         swarm = batch.swarm
@@ -92,7 +91,7 @@ class SceneHistory:
         self._keys, self._time_s, self._steps = swarm.keys.copy(), np.full(swarm.num_worlds, -1.0), 0
 
     def note(self, batch: BatchedEnv) -> None:
-        """Look at the worlds after a reset or a step; looking twice at the same moment changes nothing."""
+        """Record the worlds after a reset or a step; a second call at the same moment changes nothing."""
         swarm, facts = batch.swarm, batch.swarm.facts
         if np.array_equal(facts.time_s, self._time_s) and np.array_equal(swarm.keys, self._keys):
             return
@@ -108,7 +107,7 @@ class SceneHistory:
         self._keys, self._time_s = swarm.keys.copy(), facts.time_s.copy()
 
     def scene(self, batch: BatchedEnv, world: int, sonar_of: int | None) -> Scene:
-        """A world as it stands, with the sonar of one vehicle where it lives."""
+        """The present scene of a world, with the sonar of one vehicle unless it is lost."""
         swarm, w = batch.swarm, world
         world_map, state, facts, constraints = swarm.world_map, swarm.state, swarm.facts, swarm.scenario.constraints
         alive, position = state.alive[w].copy(), state.eta[w, :, :2].copy()
@@ -125,9 +124,7 @@ class SceneHistory:
             heading=state.eta[w, :, 2].copy(),
             alive=alive,
             near=alive & ((facts.spacing[w] < constraints.s_u_m) | (facts.clearance[w] < constraints.s_o_m)),
-            trail=np.array([sample[w] for sample in self._trail if np.isfinite(sample[w, 0, 0])]).reshape(
-                -1, *position.shape
-            ),
+            trail=np.reshape([s[w] for s in self._trail if np.isfinite(s[w, 0, 0])], (-1, *position.shape)),
             hits=np.array(self._hits[w]).reshape(-1, 3),
             arrival_s=arrival_s if np.isfinite(arrival_s) and batch.task.has_goal else None,
             collisions=int(batch.collisions[w]),

@@ -1,4 +1,4 @@
-"""Paints the sonar of one vehicle: its arrays below everything, whom it hears and its echoes above."""
+"""Paints the sonar of one vehicle: its arrays below everything, its detections and echoes above."""
 
 import math
 from itertools import pairwise
@@ -16,7 +16,7 @@ with extra("render", "rendering"):
 
 
 def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: Camera) -> None:
-    """Every array as a fan with the edges of its sub-sectors, the active ones on top."""
+    """Each array as a fan with the edges of its sub-sectors, active ones on top."""
     pose, heading = scene.position[sonar.vehicle], scene.heading[sonar.vehicle]
     middle, far = view.pixels(pose).tolist(), 3.0 * math.hypot(*view.reach)
     for array in sorted(scene.scenario.sonar.arrays, key=lambda array: array.kind == "active"):
@@ -29,7 +29,7 @@ def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: 
 
 
 def paint_detections(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: Camera, line_px: float) -> None:
-    """Lines to the vehicles that are heard, and echoes as arcs across their sub-sectors."""
+    """Lines to detected vehicles, and echoes as arcs across their sub-sectors."""
     pose, heading = scene.position[sonar.vehicle], scene.heading[sonar.vehicle]
     ahead, aside = unit(heading), unit(heading + math.pi / 2)
     middle = view.pixels(pose).tolist()

@@ -1,4 +1,4 @@
-"""The window of ``render_mode="human"``: an episode to pause, to step and to look at closely."""
+"""The window of ``render_mode="human"``, with keys to pause and step, and for speed, camera and sonar."""
 
 import math
 import os
@@ -19,7 +19,7 @@ with extra("render", "rendering"):
 
 _KEYS_PX = 26
 _MOST_FPS = 40
-"""Faster than this, steps are left out."""
+"""Most frames per second; at higher rates some steps are not drawn."""
 _SPEEDS = (0.125, 64.0)
 
 
@@ -27,9 +27,9 @@ class Window:
     """A window on one world.
 
     Args:
-        scenario: what is simulated.
+        scenario: that is simulated.
         look: size, camera and inspected vehicle at the start.
-        fps: steps per second at the speed of 1, which is real time.
+        fps: steps per second in real time, speed 1.
 
     Raises:
         RuntimeError: there is no display.
@@ -45,11 +45,11 @@ class Window:
         _OPEN.add(self)
 
     def show(self, scene: Callable[[int | None], Scene], *, wait: bool) -> None:
-        """Draw a step, and ``wait`` while it lasts or the window is paused; nothing once the user has closed it."""
+        """Draw a step, and ``wait`` for its duration or while the window is paused; do nothing once it is closed."""
         while self._shown is not None:
             touched = [self._act_on(event) for event in pygame.event.get()]
             if self._shown is None:
-                warnings.warn("the window was closed; the run goes on without it", stacklevel=4)
+                warnings.warn("the window was closed; the run continues without it", stacklevel=4)
                 return
             self._left_out += 1
             rate = self._fps * self._speed
@@ -100,7 +100,7 @@ class Window:
         shown.fill(ink.TEXT, (0, height - _KEYS_PX, width, _KEYS_PX))
         inspected = "no vehicle" if self._sonar_of is None else f"vehicle {self._sonar_of}"
         keys = (
-            f"space: {'go on' if self._paused else 'pause'}    →: one step    + −: speed ×{self._speed:g}    "
+            f"space: {'continue' if self._paused else 'pause'}    →: one step    + −: speed ×{self._speed:g}    "
             f"c: camera ({self._camera})    tab: sonar ({inspected})"
         )
         ink.write(shown, keys, (8, height - _KEYS_PX + 5), 12 if width >= 560 else 8, ink.WHITE)
@@ -108,11 +108,11 @@ class Window:
 
 
 _OPEN: WeakSet[Window] = WeakSet()
-"""Windows that are open: pygame has one display for all of a process, which the last one closes."""
+"""Open windows: pygame has one display per process, which the last one closes."""
 
 
 def _open(size: tuple[int, int], name: str) -> pygame.Surface:
-    """A window. Raises RuntimeError where nobody could see it: SDL then draws into memory without a word."""
+    """A window. Raises RuntimeError without a display: SDL would draw into memory without an error."""
     chosen = os.environ.get("SDL_VIDEODRIVER") or os.environ.get("SDL_VIDEO_DRIVER")
     try:
         pygame.display.init()
@@ -123,7 +123,7 @@ def _open(size: tuple[int, int], name: str) -> pygame.Surface:
         pygame.display.quit()
         raise RuntimeError(
             "render_mode='human' found no display for its window; use render_mode='rgb_array', which needs none, or "
-            "set the environment variable SDL_VIDEODRIVER=dummy to draw into nothing"
+            "set the environment variable SDL_VIDEODRIVER=dummy to draw into memory"
         )
     pygame.display.set_caption(f"uuv_marl: {name}")
     return pygame.display.set_mode(size)

@@ -91,14 +91,9 @@ def joined(*walls: Any) -> Float64:
 
 
 def banks(length: float, half: float, behind: float, beyond: float, radius: float) -> Float64:
-    """Large discs around the water, whose surfaces are its banks, shape (disc, 3).
+    """Large discs around the water, whose surfaces are its banks, shape (disc, 3), with this ``radius`` [m].
 
-    Args:
-        length: from the start to the goal [m].
-        half: distance of the banks at the sides [m].
-        behind: distance of the bank behind the start [m].
-        beyond: distance of the bank beyond the goal [m].
-        radius: of the discs [m].
+    Banks lie at ``half`` to the sides, ``behind`` the start and ``beyond`` the goal, which lies at ``length`` [m].
     """
     x = (-behind - radius, length + beyond + radius)
     y = (-half - radius, half + radius)
