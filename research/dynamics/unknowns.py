@@ -116,7 +116,7 @@ def measure(values: Mapping[str, Value], seeds: Sequence[int] = SEEDS) -> Number
 def errors(numbers: Numbers) -> tuple[float, ...]:
     """How far the paper's numbers are missed, relative, by ``OBJECTIVES``; from 0 to 1, above 1 where runs fail.
 
-    An obstacle distance between the paper's two for one case is no error. Any swarm that always arrives without a
+    An obstacle distance between the paper's two for one case is not an error. Any swarm that always arrives without a
     collision is better in all three than any that doesn't.
     """
     if numbers.failed:

@@ -1,4 +1,4 @@
-"""``heldout.md``: how often each policy arrives and touches nothing, written from the rows of the episodes alone."""
+"""``heldout.md``: how often each policy arrives without a collision, written from the rows of the episodes."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,7 +22,7 @@ Groups = Mapping[tuple[str, ...], Sequence[Row]]
 
 
 def write_page(folder: Path, rows: Sequence[Row]) -> list[Path]:
-    """``heldout.md`` with its picture, and its rows; the paths."""
+    """Write ``heldout.md`` with its picture and rows; return the paths."""
     page, table = folder / "heldout.md", folder / "heldout.csv.gz"
     write_rows(table, rows)
     write_text(page, report(rows))
@@ -32,7 +32,7 @@ def write_page(folder: Path, rows: Sequence[Row]) -> list[Path]:
 
 
 def tables(rows: Sequence[Row]) -> tuple[str, str]:
-    """How many episodes arrive untouched in each set, and what the episodes on random fields are like."""
+    """Collision-free arrivals in each set, and measures of the episodes on random fields, as two tables."""
     groups = grouped(rows, "policy", "set")
     policies = [name for names in GROUPS.values() for name in names if any(name == policy for policy, _ in groups)]
     return _sets(groups, policies), _fields(groups, policies)
@@ -47,7 +47,7 @@ def report(rows: Sequence[Row]) -> str:
 
 
 def _sets(groups: Groups, policies: Sequence[str]) -> str:
-    """How many episodes arrive untouched: a row for each policy, a column for each set."""
+    """Collision-free arrivals: a row for each policy, a column for each set."""
     names = [held.name for held in SETS if any(held.name == name for _, name in groups)]
     rows = [(policy, *(_share(groups.get((policy, name), ())) for name in names)) for policy in policies]
     return markdown_table(("policy", *(name.removeprefix("random_field_") for name in names)), rows)
@@ -58,7 +58,7 @@ def _share(mine: Sequence[Row]) -> str:
 
 
 def _fields(groups: Groups, policies: Sequence[str]) -> str:
-    """What the episodes on random fields are like: a row for each policy."""
+    """Measures of the episodes on random fields: a row for each policy."""
     rows = [(policy, *_cells(mine)) for policy in policies if (mine := groups.get((policy, _MAIN), ()))]
     head = ("policy", "arrived", "collided", "mean time [s]", "nearest obstacle [m]", "nearest vehicle [m]")
     return markdown_table(head, rows)
