@@ -140,9 +140,7 @@ def main(
             namespace = runpy.run_path(str(block), run_name="page")
         took, used = time.perf_counter() - began, time.process_time() - used
         good = successes(acting(learner, namespace))
-        print(
-            f"{learner}, training {training}: {good} of {EPISODES} succeed; {took:.0f} s, {used:.0f} s of processor"
-        )
+        print(f"{learner}, training {training}: {good} of {EPISODES} succeed; {took:.0f} s, {used:.0f} s of processor")
 
 
 if __name__ == "__main__":

@@ -12,9 +12,8 @@ from research.heldout.figures import draw_fields
 from research.heldout.sets import FIRST, GROUPS, SETS
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.style import house_style
-from uuv_marl.benchmark.tables import markdown_table
+from uuv_marl.benchmark.tables import NOTHING, markdown_table
 
-_NOTHING = "–"
 _MAIN = "random_field"
 """The set of the second table and of the picture."""
 Groups = Mapping[tuple[str, ...], Sequence[Row]]
@@ -54,7 +53,7 @@ def _sets(groups: Groups, policies: Sequence[str]) -> str:
 
 
 def _share(mine: Sequence[Row]) -> str:
-    return f"{sum(map(succeeded, mine))}/{len(mine)}" if mine else _NOTHING
+    return f"{sum(map(succeeded, mine))}/{len(mine)}" if mine else NOTHING
 
 
 def _fields(groups: Groups, policies: Sequence[str]) -> str:
@@ -69,7 +68,7 @@ def _cells(mine: Sequence[Row]) -> tuple[str, ...]:
     return (
         f"{len(times)}/{len(mine)}",
         f"{sum(row['collisions'] != '0' for row in mine)}",
-        f"{np.mean(times):.1f}" if times else _NOTHING,
+        f"{np.mean(times):.1f}" if times else NOTHING,
         f"{min(measured(mine, 'min_obstacle_distance_m')):.2f}",
         f"{min(measured(mine, 'min_spacing_m')):.2f}",
     )

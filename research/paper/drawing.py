@@ -8,8 +8,9 @@ from matplotlib.axes import Axes
 
 from research.columns import Columns
 from research.paper.measures import corner_times
+from uuv_marl.benchmark.results import Trace
 from uuv_marl.benchmark.style import BLACK, BLUE, GREY, ORANGE, draw_map
-from uuv_marl.benchmark.suite import Case, Suite, Trace
+from uuv_marl.benchmark.suite import Case, Suite
 from uuv_marl.types import Int64
 
 GROUPS = ((0, BLUE, "starts to port"), (1, ORANGE, "starts to starboard"))

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from uuv_marl.benchmark.suite import Trace
+from uuv_marl.benchmark.results import Trace
 from uuv_marl.types import Float32, Float64, Int64
 
 SPEED_MPS = 4.0
