@@ -17,8 +17,9 @@ import numpy as np
 
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, make, with_policy_requirements
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
+from uuv_marl.benchmark import evaluate
+from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.folder import Record
 from uuv_marl.train.run import Trainer
@@ -64,7 +65,7 @@ def digest(*values: Any) -> str:
 def episodes(scenario: Any, policy: str, first: int, most: int = MOST_AGENT_STEPS) -> str:
     """Two episodes stepped together: a hash of each over states, facts, percepts and actions."""
     scenario = with_policy_requirements(policy, scenario)
-    swarm, actor = Swarm(scenario, 2), make(policy, scenario, 2)
+    swarm, actor = Swarm(scenario, 2), make_policy(policy, scenario, 2)
     percept, active, hashed = swarm.reset(first), np.ones(2, np.bool_), [hashlib.sha256(), hashlib.sha256()]
     actor.reset(first)
     for _ in range(most // swarm.num_vehicles):
@@ -84,7 +85,7 @@ def episodes(scenario: Any, policy: str, first: int, most: int = MOST_AGENT_STEP
 def parallel(scenario: str, policy: str, reward: Any) -> str:
     """An episode, or its first thousand steps, through ``parallel_env``."""
     env = uuv_marl.parallel_env(with_policy_requirements(policy, load_scenario(scenario)), reward=reward)
-    actor, hashed = make(policy, env), list[str]()
+    actor, hashed = make_policy(policy, env), list[str]()
     (observations, _), _ = env.reset(SEED), actor.reset(SEED)
     while env.agents and len(hashed) < 1000:
         observations, *outcome, _ = env.step(actor(observations))
@@ -105,7 +106,7 @@ def vector(scenario: str) -> str:
 def reported(policy: str) -> str:
     """The benchmark's metrics, series and trajectories of two short episodes."""
     scenario = with_policy_requirements(policy, load_scenario("single_obstacle", num_vehicles=10))
-    runs = [run for run in evaluate(scenario, policy, [SEED, SEED + 1]) if isinstance(run, Run)]
+    runs = [run for run in evaluate.episodes(scenario, policy, [SEED, SEED + 1]) if isinstance(run, Run)]
     metrics = [{key: value for key, value in run.metrics.items() if key in METRICS} for run in runs]
     return digest(metrics, *(a for run in runs for a in (*run.series.values(), *run.routes)))
 

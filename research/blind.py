@@ -2,11 +2,11 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
-from uuv_marl.baselines import Policy, make
+from uuv_marl.baselines import Policy, make_policy
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike
@@ -19,13 +19,11 @@ BLIND = "research.blind:Blind,inner="
 class Blind(Policy):
     """A network, or any policy with its decision period and yaw damping, without echoes in its percepts."""
 
-    yaw_damping_nms: ClassVar[float] = 600.0
-    decision_period_s: ClassVar[float | None] = 0.5
-    outputs_force: ClassVar[bool] = True
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, decision_period_s=0.5, outputs_force=True)
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: str) -> None:
         super().__init__(scenario, num_worlds)
-        self._inner = make(inner, scenario, num_worlds)
+        self._inner = make_policy(inner, scenario, num_worlds)
         masks = [np.full(field.size, not field.name.startswith("echo")) for field in self.layout.table]
         self._mask = np.concatenate(masks).astype(np.float32)
 

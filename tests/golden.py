@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
@@ -131,7 +131,7 @@ def runs(name: str) -> Iterator[tuple[str, Any]]:
 def hashes(scenario: Scenario, policy: str, decisions: int, parts: tuple[str, ...]) -> dict[str, str]:
     """Of the parts of a run, a hash for each of its seeds."""
     scenario = with_policy_requirements(policy, scenario)
-    env, actor = BatchedEnv(scenario, WORLDS, REWARD), make(policy, scenario, WORLDS)
+    env, actor = BatchedEnv(scenario, WORLDS, REWARD), make_policy(policy, scenario, WORLDS)
     hashed = {what: [hashlib.sha256() for _ in range(WORLDS)] for what in parts}
     running = np.ones(WORLDS, np.bool_)
 
@@ -163,7 +163,7 @@ def sample(scenario: Scenario, policy: str, decisions: int) -> list[float]:
     own = with_policy_requirements(policy, scenario)
     damping = with_policy_requirements(DRIVER, scenario).actuators.yaw_damping_nms
     driven = load_scenario(own, overrides={"actuators.yaw_damping_nms": damping})
-    swarm, driver, actor = Swarm(driven, WORLDS), make(DRIVER, driven, WORLDS), make(policy, own, WORLDS)
+    swarm, driver, actor = Swarm(driven, WORLDS), make_policy(DRIVER, driven, WORLDS), make_policy(policy, own, WORLDS)
     swarm.reset(0)
     driver.reset(0)
     actor.reset(0)

@@ -11,7 +11,7 @@ from uuv_marl.baselines.learned.trained import Trained
 ANYWHERE = [
     name
     for name, policy in POLICIES.items()
-    if "path" not in policy.channels
+    if "path" not in policy.requirements.channels
     and name != "nearest_target"  # which needs a box
     and not (isinstance(policy, Trained) and policy.checkpoint.card.percept != card_rows(load_scenario("starter")))
 ]

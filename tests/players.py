@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode
 from pettingzoo.utils import BaseParallelWrapper
 
 import uuv_marl
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.scenario import load_scenario
 
@@ -24,7 +24,7 @@ def suited(name, scenario, **overrides):
 def reference(name, scenario, seed, decisions):
     """``Policy.act`` on the swarm's own percepts."""
     env = make_batched_env(scenario, WORLDS, max_cycles=CYCLES)
-    policy, records = make(name, scenario, WORLDS), [[] for _ in range(WORLDS)]
+    policy, records = make_policy(name, scenario, WORLDS), [[] for _ in range(WORLDS)]
     env.reset(seed)
     while min(map(len, records)) < decisions:
         alive, actions = env.swarm.state.alive.copy(), policy.act(env.swarm.percept).copy()
@@ -59,7 +59,7 @@ def wrapped(name, scenario, seed, decisions, rng):
 
 
 def _dictionaries(env, name, seed, decisions, rng):
-    policy, record = make(name, env), []
+    policy, record = make_policy(name, env), []
     observations, _ = env.reset(seed=seed)
     while len(record) < decisions:
         if rng.random() < 0.3:
@@ -77,7 +77,7 @@ def parts(name, scenario, seed, decisions, rng):
     records = []
     for w in range(WORLDS):
         env, record = uuv_marl.parallel_env(scenario, max_cycles=CYCLES), []
-        policy = make(name, env)
+        policy = make_policy(name, env)
         observations, _ = env.reset(seed=seed + w)
         while len(record) < decisions:
             agents, actions = rng.permutation(env.agents), {}
@@ -96,7 +96,7 @@ def aec(name, scenario, seed, decisions, rng):
     records = []
     for w in range(WORLDS):
         env, record = uuv_marl.env(scenario, max_cycles=CYCLES), []
-        policy, own = make(name, env), seed + w
+        policy, own = make_policy(name, env), seed + w
         while len(record) < decisions:
             env.reset(seed=own)
             own, actions = None, {}
@@ -119,7 +119,7 @@ def vector(name, scenario, seed, decisions, rng):
     """Gymnasium's vector API in one of its three modes."""
     mode = list(AutoresetMode)[rng.integers(len(AutoresetMode))]
     envs = uuv_marl.vector_env(WORLDS, scenario, max_cycles=CYCLES, autoreset_mode=mode)
-    policy, records = make(name, envs), [[] for _ in range(WORLDS)]
+    policy, records = make_policy(name, envs), [[] for _ in range(WORLDS)]
     observations, _ = envs.reset(seed=seed)
     ignored = np.zeros(WORLDS, bool)
     while min(map(len, records)) < decisions:
@@ -141,7 +141,7 @@ def sb3(name, scenario, seed, decisions, rng):
     from uuv_marl.envs.sb3 import SwarmVecEnv
 
     env = VecCheckNan(SwarmVecEnv(scenario, WORLDS, max_cycles=CYCLES))
-    policy, records = make(name, env), [[] for _ in range(WORLDS)]
+    policy, records = make_policy(name, env), [[] for _ in range(WORLDS)]
     env.seed(seed)
     observations = env.reset()
     for _ in range(decisions):
@@ -157,7 +157,7 @@ def solo(name, scenario, seed, decisions, rng):
     records = []
     for w in range(WORLDS):
         env = gymnasium.make("uuv_marl/Solo-v1", scenario=scenario, others=name, max_cycles=CYCLES)
-        policy, record = make(name, env), []
+        policy, record = make_policy(name, env), []
         observation, _ = env.reset(seed=seed + w)
         while len(record) < decisions:
             record.append(policy(observation)[None])

@@ -16,8 +16,8 @@ from research.episodes import read_rows
 from tests.golden import STARTER
 from tests.nets import ANYWHERE, saved
 from uuv_marl import load_scenario, parallel_env, scenario_names
-from uuv_marl.baselines import POLICIES, Policy, PolicyError, make, with_policy_requirements
-from uuv_marl.baselines.making import uses_identity
+from uuv_marl.baselines import POLICIES, Policy, PolicyError, make_policy, with_policy_requirements
+from uuv_marl.baselines.making import policy_requirements
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
 from uuv_marl.benchmark.tuning import SPACES, TRIALS
@@ -64,7 +64,7 @@ def written_as_in_the_paper(percept, gains, limits):
 @given(st.integers(0, 1000))
 def test_the_controller_is_equations_18_to_22(seed):
     scenario = load_scenario("single_obstacle")
-    swarm, policy = Swarm(scenario), make("bio_inspired", scenario)
+    swarm, policy = Swarm(scenario), make_policy("bio_inspired", scenario)
     swarm.reset(seed)
     swarm.state.eta[0, :, :2] += 150.0  # before and beside the obstacle
     percept = swarm.observe()
@@ -84,7 +84,7 @@ def test_forces_turn_with_the_world(name):
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     actions = []
     for moved in (False, True):
-        swarm, policy = Swarm(scenario), make(name, scenario)
+        swarm, policy = Swarm(scenario), make_policy(name, scenario)
         swarm.reset(3)
         swarm.state.eta[0, :, :2] += 150.0
         if moved:
@@ -108,7 +108,7 @@ def test_who_a_vehicle_is_does_not_matter(name):
     scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=20))
     order, actions = np.random.default_rng(0).permutation(20), []
     for places in (np.arange(20), order):
-        swarm, policy = Swarm(scenario), make(name, scenario)
+        swarm, policy = Swarm(scenario), make_policy(name, scenario)
         swarm.reset(3)
         swarm.state.eta[0, :, :2] += 150.0
         swarm.state.eta[0], swarm.state.nu[0] = swarm.state.eta[0, places], swarm.state.nu[0, places]
@@ -131,7 +131,7 @@ def test_sff_predicts_where_a_neighbour_will_be():
     layout = PerceptLayout.of(scenario)
 
     def second_action(before, now, yaw_rate=0.0):
-        policy = make("sff", scenario, gains=gains)
+        policy = make_policy("sff", scenario, gains=gains)
         for place in (before, now):
             flat = np.zeros((1, 2, layout.size), np.float32)
             percept = Percept(flat, layout)
@@ -177,14 +177,14 @@ def test_tuned_gains_come_from_shipped_trials(file):
     chosen = {"scout": "scout,preset=closed", "nearest_target.lanes": "nearest_target,lanes=true"}
     policy = chosen.get(file, f"{name},tuned_for={what}" if what else name)
     flown_in = "silent_targets" if name == "nearest_target" else "tracking"
-    made = make(policy, with_policy_requirements(policy, load_scenario(flown_in)))
+    made = make_policy(policy, with_policy_requirements(policy, load_scenario(flown_in)))
     numbers = vars(made) | made.gains._asdict() | (made.barrier._asdict() if hasattr(made, "barrier") else {})
     assert {key: numbers[key] for key in data["best"]} == data["best"]
 
 
 def flown(name, scenario, decisions=6, worlds=2):
     scenario = with_policy_requirements(name, load_scenario(scenario))
-    swarm, policy = Swarm(scenario, worlds), make(name, scenario, worlds)
+    swarm, policy = Swarm(scenario, worlds), make_policy(name, scenario, worlds)
     percept = swarm.reset(0)
     policy.reset(0)
     for _ in range(decisions):
@@ -227,7 +227,7 @@ def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
     before = [array[1].copy() for array in policy.memory]
     percept = swarm.reset([5], worlds=[0])
     action = policy.act(percept)
-    alone = make(name, swarm.scenario, 1)
+    alone = make_policy(name, swarm.scenario, 1)
     assert np.array_equal(action[0], alone.act(Swarm(swarm.scenario).reset(5))[0])
     assert any(not np.array_equal(now[0], then) for now, then in zip(policy.memory, before, strict=True))
     idle = policy.memory[0][0].copy()
@@ -239,21 +239,21 @@ def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
 
 def test_gains_and_parameters_can_be_written_behind_a_name():
     scenario = load_scenario(STARTER)
-    policy = make("bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle", scenario)
+    policy = make_policy("bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle", scenario)
     assert policy.gains == bio_inspired.BioInspiredGains(zeta_n=0.5)
-    assert make("bio_inspired", scenario, zeta_n=0.5).gains == policy.gains
+    assert make_policy("bio_inspired", scenario, zeta_n=0.5).gains == policy.gains
     percept = Swarm(scenario).reset(0)
-    assert not np.array_equal(policy.act(percept), make("bio_inspired", scenario).act(percept))
+    assert not np.array_equal(policy.act(percept), make_policy("bio_inspired", scenario).act(percept))
     assert with_policy_requirements("sff,cluster=3", scenario).sonar.channels == ("link",)
 
 
 def test_a_preset_is_a_set_of_numbers_of_which_each_can_still_be_given():
     scenario = with_policy_requirements("scout", load_scenario(STARTER))
-    assert make("scout", scenario).gains == make(f"scout,preset={DEFAULT_PRESET}", scenario).gains
+    assert make_policy("scout", scenario).gains == make_policy(f"scout,preset={DEFAULT_PRESET}", scenario).gains
     for name, preset in PRESETS.items():
-        policy = make(f"scout,preset={name},push=3.5,safety_filter=true", scenario).inner
+        policy = make_policy(f"scout,preset={name},push=3.5,safety_filter=true", scenario).inner
         assert (policy.gains, policy.barrier) == (preset.gains._replace(push=3.5), preset.barrier)
-        assert make("scout", scenario, preset=name).gains == preset.gains
+        assert make_policy("scout", scenario, preset=name).gains == preset.gains
 
 
 class Nothing(Policy):
@@ -278,9 +278,9 @@ class Nothing(Policy):
 )
 def test_a_name_that_means_nothing_is_explained(name, message):
     with pytest.raises(PolicyError, match=message):
-        make(name, load_scenario(STARTER))
+        make_policy(name, load_scenario(STARTER))
     with pytest.raises(PolicyError, match=message):
-        make(name, parallel_env(STARTER))
+        make_policy(name, parallel_env(STARTER))
 
 
 def test_what_a_policy_cannot_be_made_for_is_explained():
@@ -288,7 +288,7 @@ def test_what_a_policy_cannot_be_made_for_is_explained():
     for arguments, message in (((damped,), "yaw damping of 0"), (("tracking",), "made for a Scenario"),
                                ((load_scenario("tracking"), 0), "num_worlds must be at least 1")):  # fmt: skip
         with pytest.raises(PolicyError, match=message):
-            make("bio_inspired", *arguments)
+            make_policy("bio_inspired", *arguments)
 
 
 @pytest.mark.parametrize(
@@ -306,7 +306,7 @@ def test_the_inner_loop_is_scaled_with_the_vehicle_s_torque(name, change, dampin
     assert scenario.actuators.yaw_damping_nms == pytest.approx(damping, rel=1e-12)
     any_vehicle = {"any_vehicle": True} if name == "mappo" else {}
     percept = Swarm(scenario).reset(0)
-    assert np.isfinite(make(name, scenario, **any_vehicle).act(percept)).all()
+    assert np.isfinite(make_policy(name, scenario, **any_vehicle).act(percept)).all()
 
 
 @pytest.mark.parametrize("name", [*POLICIES, "nearest_target,lanes=true", "sdc,safety_filter=true"])
@@ -316,16 +316,17 @@ def test_a_policy_that_acts_by_a_vehicles_index_declares_it(name):
     homes = {"nearest_target": "silent_targets", "oracle": "hard_water", "carrot_informed": "hard_water"}
     home = homes.get(plain, plain if plain in scenario_names() else "starter")
     scenario = with_policy_requirements(name, load_scenario(home, num_vehicles=4))
-    policy, alike, swarm = make(name, scenario), make(name, scenario), Swarm(scenario)
+    policy, alike, swarm = make_policy(name, scenario), make_policy(name, scenario), Swarm(scenario)
     percept, acted_alike = swarm.reset(3), True
     for _ in range(12):
         action = policy.act(percept).copy()
         copies = dataclasses.replace(percept, flat=np.repeat(percept.flat[:, 2:3], 4, axis=1))
         acted_alike &= np.allclose(alike.act(copies), action[:, 2:3], atol=1e-3)
         percept = swarm.step(action)
-    assert uses_identity(name) == (not acted_alike and name != "random")
+    assert policy_requirements(name).identity == (not acted_alike and name != "random")
 
 
 def test_a_network_around_a_law_that_acts_by_the_index_does_so_too(tmp_path):
     for law, told in {"nearest_target,lanes=true": True, "nearest_target,lanes=false": False}.items():
-        assert uses_identity(saved(tmp_path, load_scenario("silent_targets"), around=law)) is told
+        checkpoint = saved(tmp_path, load_scenario("silent_targets"), around=law)
+        assert policy_requirements(checkpoint).identity is told

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.comparators import apf, olfati_saber, orca
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
@@ -72,7 +72,7 @@ def test_the_field_is_zero_at_the_goal_though_an_obstacle_is_near():
     scenario, percept = seen("apf")
     percept["echo"][0, 0, 3], percept["echo_range"][0, 0, 3] = 1.0, 5.0
     percept["echo_position"][0, 0, 3] = (30.0, 0.0)
-    policy = make("apf", scenario, gains=APF)
+    policy = make_policy("apf", scenario, gains=APF)
     np.testing.assert_array_equal(policy.act(percept)[0, 0], 0.0)
     percept["reference"][0, 0] = (70.0, 0.0)  # beyond the obstacle
     assert policy.act(percept)[0, 0, 0] < 0.0
@@ -112,7 +112,7 @@ def test_vehicles_in_free_water_settle_at_the_spacing(spacing):
         spacing=spacing, reach=1.3, attraction=100.0, repulsion=500.0, pull=5.0, reference_velocity=300.0
     )
     scenario = with_policy_requirements("olfati_saber", load_scenario("tracking", num_vehicles=7))
-    swarm, policy = Swarm(scenario), make("olfati_saber", scenario, gains=gains)
+    swarm, policy = Swarm(scenario), make_policy("olfati_saber", scenario, gains=gains)
     swarm.reset(10_000)
     angle = np.arange(6) * math.pi / 3
     ring = 12.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -159,6 +159,6 @@ def test_the_field_is_bounded_and_what_was_cut_is_counted():
     scenario, percept = seen("apf", 2)
     percept["detected"][0, 0, 3] = 1.0  # a neighbour at the very same place
     percept["echo"][0, 1, 3] = 1.0  # an obstacle's surface
-    policy = make("apf", scenario, gains=APF)
+    policy = make_policy("apf", scenario, gains=APF)
     assert np.isfinite(policy.act(percept)).all()
     assert policy.clamps.tolist() == [2]

@@ -1,4 +1,4 @@
-"""The compile cache never serves old physics, compiles no more than an edit asks for, and survives a broken file."""
+"""The compile cache is never out of date, compiles only what an edit changes, and tolerates broken files."""
 
 import compileall
 import dis
@@ -92,7 +92,7 @@ def test_an_edit_compiles_what_uses_it_and_nothing_else(copy, tmp_path):
     assert "Compiling" in bounds.stderr, "code without bounds checks was served where they were asked for"
 
 
-def test_broken_files_of_the_cache_are_compiled_anew(copy, tmp_path):
+def test_broken_files_of_the_cache_are_compiled_again(copy, tmp_path):
     cache = tmp_path / "cache"
     good = run(copy, cache).stdout
     for pattern in ("motion.integrate*.nbi", "motion.integrate*.nbc"):
@@ -129,7 +129,7 @@ def test_a_package_without_sources_on_disk_never_runs_old_physics(copy, tmp_path
 
 
 def test_every_function_of_compiled_code_is_part_of_its_key():
-    """Whatever a compiled function looks up in its module is in a module that the key covers, or a library's."""
+    """Every global name of a compiled function belongs to a module that the key covers, or to a library."""
     functions = 0
     for path in PACKAGE.rglob("*.py"):
         if "@compiled" not in path.read_text():
@@ -159,7 +159,7 @@ def test_a_cache_that_cannot_be_used_is_explained_and_the_run_goes_on(tmp_path):
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
-    """What the cache is, asked anew at every call."""
+    """The cache, looked up again at every call."""
     monkeypatch.setenv("UUV_MARL_CACHE_DIR", str(tmp_path))
 
     def ask():
@@ -212,7 +212,7 @@ def test_without_a_home_folder_there_is_no_cache_and_a_word(cache, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("pwd.getpwuid", lambda uid: {}[uid])
     assert cache() is None
-    assert "every start compiles anew" in caplog.text
+    assert "every start compiles again" in caplog.text
     assert list(tmp_path.iterdir()) == []
 
 
@@ -222,8 +222,8 @@ def test_the_cache_can_lie_in_the_home_folder(cache, monkeypatch, tmp_path):
     assert cache().folder.is_relative_to(tmp_path / "mine")
 
 
-def test_tidying_deletes_what_is_ours_and_old_and_nothing_else(cache, tmp_path):
-    """Whatever the names: folders and files of others stay, in the folder that the user chose and in ours."""
+def test_only_old_files_of_the_cache_are_deleted(cache, tmp_path):
+    """Other folders and files stay, in the user's folder and in the cache's own."""
     now, own = cache().folder, tmp_path / "uuv_marl-compiled"
     key = "0123456789abcdef"
     theirs = [
@@ -260,7 +260,7 @@ def test_a_folder_of_our_name_with_files_of_others_is_not_taken(cache, tmp_path,
 
 
 def test_inner_functions_refuse_python_and_do_not_crash():
-    """They have no door for Python, and entering where there is none would end the process."""
+    """They have no Python wrapper, so that a call would crash."""
     from uuv_marl.sim import world
 
     swarm = Swarm(load_scenario("starter"))
@@ -271,7 +271,7 @@ def test_inner_functions_refuse_python_and_do_not_crash():
 
 
 def test_threads_without_work_sleep():
-    """Threads that spin while they wait take the core from others: beside a training a batch was ten times as slow."""
+    """Threads that spin while they wait slow others down: a batch during a training took ten times as long."""
     swarm, action = Swarm(load_scenario("single_obstacle"), 8), np.zeros((8, 54, 2), np.float32)
     swarm.reset(0)
     swarm.step(action)

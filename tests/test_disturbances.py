@@ -1,4 +1,4 @@
-"""The water and the forces: laws of currents, lags, mismatch and faults. The sonar's are in test_sea_sonar.py."""
+"""Currents, lags, mismatch and faults; test_disturbances_sonar.py has the sonar and navigation."""
 
 import itertools
 import math
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make
+from uuv_marl.baselines import make_policy
 from uuv_marl.sim.disturbances.actuation import followed, victims
 from uuv_marl.sim.disturbances.current import advance_gust, eddy_flow, flow_at
 from uuv_marl.sim.disturbances.disturbances import DISTURBANCE_CHANNELS, disturbance_tables
@@ -40,11 +40,11 @@ HEARD = EVERYTHING | {
     "noise.false_echo_probability": 0.1, "navigation.drift_share": 0.1, "navigation.compass_bias_deg": 10.0,
     "modem.period_s": 0.5, "sonar.channels": ["modem", "link", "age"],
 }  # fmt: skip
-"""And all that makes readings late and wrong."""
+"""The same with all delays and errors of readings."""
 
 
 def swim(overrides, decisions=40, worlds=1, seed=3, scenario=STARTER, **change):
-    """A swarm after decisions that are the same whatever disturbs it."""
+    """A swarm after decisions that don't depend on its disturbances."""
     swarm = Swarm(load_scenario(scenario, overrides=overrides, **change), worlds)
     swarm.reset(seed)
     rng = np.random.default_rng(7)
@@ -57,7 +57,7 @@ def swim(overrides, decisions=40, worlds=1, seed=3, scenario=STARTER, **change):
 
 
 @pytest.mark.parametrize("channel", DISTURBANCE_CHANNELS)
-def test_a_sea_in_which_nothing_is_on_moves_no_bit(channel):
+def test_the_code_of_disturbances_with_all_of_them_off_changes_no_bit(channel):
     for worlds in (1, 3):
         calm, still = (swim({"sonar.channels": channels}, worlds=worlds) for channels in ([], [channel]))
         theirs = still.snapshot()
@@ -67,8 +67,8 @@ def test_a_sea_in_which_nothing_is_on_moves_no_bit(channel):
 
 
 @pytest.mark.parametrize("part", [CURRENT, GUSTS, EDDIES, LAGS, MISMATCH, FAULTS])
-def test_one_disturbance_moves_no_draw_of_another(part):
-    """Starts, courses and what else the seed decides are the same with it alone and with everything on."""
+def test_one_disturbance_changes_no_random_number_of_another(part):
+    """Starts, maps and all else that the seed decides are the same with it alone and with everything on."""
     alone, among = (swim(change, 0, scenario="random_field") for change in (part, EVERYTHING))
     for name in ("eta", "nu", "waypoints", "obstacles", "losses"):
         np.testing.assert_array_equal(alone.snapshot()[name], among.snapshot()[name], name)
@@ -100,8 +100,8 @@ def test_a_snapshot_resumes_bit_for_bit():
         swarm.restore(kept)
 
 
-def test_a_reset_leaves_nothing_of_the_episode_before():
-    """Readings on their way, messages, lags, drift, faults: a world that is reset is one that is new."""
+def test_a_reset_leaves_nothing_of_the_previous_episode():
+    """Delayed readings, messages, lags, drift, faults: a reset world equals a new one."""
     used, new = swim(HEARD, 30, 2), swim(HEARD, 0, 2, seed=[8, 9])
     used.reset([9], worlds=[1])
     for name, array in used.snapshot().items():
@@ -113,7 +113,7 @@ def test_a_reset_leaves_nothing_of_the_episode_before():
 
 
 def test_a_uniform_current_carries_the_same_motion_along():
-    """Galilean invariance: headings and velocities through the water keep their bits, positions move by V t."""
+    """Galilean invariance: headings and velocities relative to the water keep their bits, positions move by V t."""
     calm, carried = swim(OPEN, 200), swim(OPEN | CURRENT, 200)
     np.testing.assert_array_equal(calm.state.nu, carried.state.nu)
     np.testing.assert_array_equal(calm.state.eta[:, :, 2], carried.state.eta[:, :, 2])
@@ -124,7 +124,7 @@ def test_a_uniform_current_carries_the_same_motion_along():
 
 
 def test_a_policy_that_follows_a_drifting_point_swims_as_in_still_water():
-    """Closed loop: l(t) drifts with the water, and everybody knows velocities through it."""
+    """Closed loop: l(t) drifts with the water, and vehicles measure velocities relative to it."""
     straight_leg = {"trajectory.waypoints_m": [[0.0, 0.0], [160.0, 0.0]], "random_field": None} | OPEN
     drifting = {
         "trajectory.waypoints_m": [[0.0, 0.0], [160.0, 20.0]],
@@ -141,7 +141,7 @@ def test_a_policy_that_follows_a_drifting_point_swims_as_in_still_water():
         start = swarm.snapshot() if start is None else start
         swarm.state.eta[:], swarm.state.nu[:] = start["eta"], start["nu"]
         swarm.observe()
-        policy = make("bio_inspired", swarm.scenario, 1)
+        policy = make_policy("bio_inspired", swarm.scenario, 1)
         policy.reset(0)
         for _ in range(100):
             swarm.step(policy.act(swarm.percept))
@@ -149,8 +149,8 @@ def test_a_policy_that_follows_a_drifting_point_swims_as_in_still_water():
     np.testing.assert_allclose(shift[0], np.tile([0.0, 5.0, 0.0], (8, 1)), atol=1e-4)  # percepts are float32
 
 
-def test_a_lost_vehicle_that_is_still_heard_stands_still():
-    """It stays where it was lost, and the current doesn't carry it along, though a late reading shows it."""
+def test_a_lost_vehicle_that_is_still_detected_is_at_rest():
+    """It stays where it was lost, though a delayed reading still shows it."""
     overrides = CURRENT | {"latency.processing_s": 1.0, "sonar.channels": ["link"]}
     faults = {"faults": [{"kind": "member", "share": 0.2, "onset_s": 2.0}]}
     swarm = swim(overrides | faults, 25)
@@ -161,7 +161,7 @@ def test_a_lost_vehicle_that_is_still_heard_stands_still():
     assert not swarm.velocity[0, gone].any()
 
 
-@pytest.mark.parametrize("hold_s", [0.1, 0.5, 2.0])
+@pytest.mark.parametrize("control_step_s", [0.1, 0.5, 2.0])
 def test_the_process_has_its_mean_variance_and_memory_whatever_the_step(control_step_s):
     """20,000 draws: a mean within 5 / sqrt(n) deviations, a variance within 5 sqrt(2 / n)."""
     tau = 3.0
@@ -169,16 +169,16 @@ def test_the_process_has_its_mean_variance_and_memory_whatever_the_step(control_
                  "timing.decision_period_s": control_step_s}  # fmt: skip
     swarm = Swarm(load_scenario(STARTER, overrides=overrides), num_worlds=1)
     swarm.reset(0)
-    sea = swarm._disturbances
+    disturbances = swarm._disturbances
     steps = round(6.0 / control_step_s)
     first, last = [], []
     for key in np.random.default_rng(0).integers(0, 2**63, 2000).astype(np.uint64):
         for tick in range(0, 5000, 1000):
-            sea.flow.gust[0] = 0.4 * np.array(normals(key, 999, tick, 0, 0))
-            first.append(sea.flow.gust[0].copy())
+            disturbances.flow.gust[0] = 0.4 * np.array(normals(key, 999, tick, 0, 0))
+            first.append(disturbances.flow.gust[0].copy())
             for k in range(1, steps + 1):
-                advance_gust(0, key, tick + k, sea.water, sea.flow)
-            last.append(sea.flow.gust[0].copy())
+                advance_gust(0, key, tick + k, disturbances.water, disturbances.flow)
+            last.append(disturbances.flow.gust[0].copy())
     start, end = np.concatenate(first) / 0.4, np.concatenate(last) / 0.4
     m = len(end)
     assert abs(end.mean()) < 5 / math.sqrt(m)
@@ -199,14 +199,14 @@ def test_an_eddy_has_no_divergence_no_jumps_and_no_flow_at_its_centre(x, y, core
     assert eddy_flow(0.0, 0.0, 30.0, core) == (0.0, 0.0)
 
 
-def test_the_fastest_water_of_an_eddy_has_the_speed_that_is_asked_for():
+def test_the_fastest_water_of_an_eddy_has_the_given_speed():
     swarm = swim(EDDIES, 0)
     water, core = swarm._disturbances.water, swarm._disturbances.water.core
     speeds = [math.hypot(*eddy_flow(r, 0.0, water.circulation, core)) for r in np.linspace(0.5 * core, 2 * core, 2001)]
     assert max(speeds) == pytest.approx(1.2, rel=1e-6)
 
 
-def test_eddies_turn_by_turns_so_that_their_circulation_sums_to_nothing():
+def test_eddies_alternate_so_that_their_circulation_sums_to_zero():
     for name in (STARTER, "random_field", "tracking"):
         swarm = swim(EDDIES, 0, worlds=2, scenario=name)
         eddies = swarm._disturbances.flow.eddies
@@ -258,7 +258,7 @@ def test_a_lag_keeps_the_integration_s_fourth_order():
         assert 10 < coarse / fine < 24
 
 
-def test_a_vehicle_that_differs_swims_as_a_scenario_with_its_numbers():
+def test_a_vehicle_with_mismatch_moves_as_in_a_scenario_with_its_numbers():
     swarm = swim(MISMATCH, 0)
     nominal = plant(swarm.scenario)
     for i in range(5):
@@ -299,7 +299,7 @@ def test_faults_act_from_their_onset_for_their_duration():
 
 
 def test_no_array_of_a_swarm_hides_another_of_its_name():
-    """In snapshots: else half of the water is forgotten."""
+    """In snapshots, else one of the two would be lost."""
     swarm = swim(HEARD, 0)
     names = [name for table in (*swarm._world, *disturbance_tables(swarm._disturbances)) for name in table._fields]
     assert len(set(names)) == len(names)

@@ -1,4 +1,4 @@
-"""Messages: who hears what of whom, when, and what is lost."""
+"""Messages: content, schedule, age and losses."""
 
 import math
 
@@ -7,9 +7,10 @@ import pytest
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
-from uuv_marl.baselines import Policy, make, with_policy_requirements
+from uuv_marl.baselines import Policy, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, save_checkpoint
 from uuv_marl.baselines.learned.layers import shapes
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.sim.swarm import Swarm
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
@@ -48,7 +49,7 @@ def test_a_message_is_the_velocity_when_it_was_sent_and_its_age_follows_the_sche
                 np.testing.assert_allclose(see["modem_velocity"][0, i, k], told, rtol=1e-5, atol=1e-5)
 
 
-def test_a_lost_vehicle_says_no_more():
+def test_a_lost_vehicle_sends_no_more():
     swarm = list(swum({"faults": [{"kind": "member", "share": 0.2, "onset_s": 3.0}]}))[-1]
     gone = np.flatnonzero(~swarm.state.alive[0])
     assert len(gone) == 1
@@ -56,19 +57,19 @@ def test_a_lost_vehicle_says_no_more():
     assert (np.delete(swarm._disturbances.messages.sent[0, :, 2], gone) > 7.9).all()
 
 
-def test_messages_are_lost_as_often_as_is_said():
+def test_messages_are_lost_at_the_given_rate():
     """1,000 rounds of 5 vehicles: 20,000 messages; the share within 5 deviations."""
     arrived, before = 0, None
     for swarm in swum({"modem.loss_probability": 0.3, "modem.period_s": 0.1}, 500, worlds=2):
-        now = swarm._disturbances.messages.mail[..., 2].copy()
+        now = swarm._disturbances.messages.received[..., 2].copy()
         arrived += int((now != before).sum()) if before is not None else 0
         before = now
     total = 500 * 2 * 20
     assert abs(arrived / total - 0.7) < 5 * math.sqrt(0.3 * 0.7 / total)
 
 
-def test_compasses_turn_what_is_said_and_what_is_read():
-    """A velocity over ground is north and east by the sender's compass, ahead and abeam by the listener's."""
+def test_compass_errors_turn_messages_sent_and_read():
+    """A velocity over ground is north and east by the sender's compass, ahead and abeam by the receiver's."""
     turns = 0
     for swarm in swum({"navigation.compass_bias_deg": 30.0, "modem.period_s": 0.1}, 20):
         bias = swarm._disturbances.navigation_errors.bias[0] @ [1.0, 1.0j]
@@ -83,7 +84,7 @@ def test_compasses_turn_what_is_said_and_what_is_read():
 
 @pytest.mark.parametrize("policy", ["sff", "sdc", "olfati_saber_informed", "orca_informed"])
 def test_comparators_run_on_messages_as_on_the_link(policy):
-    """The same law: where messages are as fresh as the link, it does the same."""
+    """The same controller: with messages as recent as the link it acts the same."""
     base = {"modem.period_s": 0.1, "obstacles": []}
     linked = with_policy_requirements(policy, load_scenario(STARTER, overrides=base))
     messaged = with_policy_requirements(policy, load_scenario(STARTER, overrides={**base, "sonar.channels": ["modem"]}))
@@ -93,7 +94,7 @@ def test_comparators_run_on_messages_as_on_the_link(policy):
     for scenario in (linked, messaged):
         swarm = Swarm(scenario)
         swarm.reset(0)
-        actor = make(policy, scenario)
+        actor = make_policy(policy, scenario)
         actor.reset(0)
         for _ in range(30):
             swarm.step(actor.act(swarm.percept))
@@ -103,18 +104,18 @@ def test_comparators_run_on_messages_as_on_the_link(policy):
 
 
 def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
-    """Not for one that asks for both, nor for an actor that was trained on the link."""
-    sea = load_scenario(STARTER, overrides={"sonar.channels": ["link", "modem"]})
-    assert with_policy_requirements("sff", sea).sonar.channels == ("modem",)
-    assert with_policy_requirements("tests.test_disturbances_modem:Both", sea).sonar.channels == ("link", "modem")
+    """Not for a policy that requires both, nor for an actor that was trained on the link."""
+    scenario = load_scenario(STARTER, overrides={"sonar.channels": ["link", "modem"]})
+    assert with_policy_requirements("sff", scenario).sonar.channels == ("modem",)
+    assert with_policy_requirements("tests.test_disturbances_modem:Both", scenario).sonar.channels == ("link", "modem")
     linked = load_scenario(STARTER, overrides={"sonar.channels": ["link"]})
     card = card_of(linked)
     zeros = {name: np.zeros(shape) for name, shape in shapes(card.network, card.sizes).items()}
     save_checkpoint(tmp_path / WEIGHTS_FILE, card, zeros)
-    assert with_policy_requirements(str(tmp_path), sea).sonar.channels == ("link",)
+    assert with_policy_requirements(str(tmp_path), scenario).sonar.channels == ("link",)
 
 
 class Both(Policy):
-    """Compares what it is told with what is true."""
+    """Compares messages with true values."""
 
-    channels = ("link", "modem")
+    requirements = PolicyRequirements(("link", "modem"))

@@ -1,4 +1,4 @@
-"""Sonar that is late and wrong, and navigation that drifts: laws, and distributions over 10^5 draws."""
+"""Delays and errors of sonar and navigation: properties, and distributions over 10^5 samples."""
 
 import itertools
 import math
@@ -50,7 +50,7 @@ def near_obstacles(swarm):
 
 
 def swim(overrides, decisions=40, seed=3, num_vehicles=12, scenario="single_obstacle", idle=False):
-    """A run whose actions are the same whatever disturbs it; what is known and true at every decision."""
+    """A run with actions that don't depend on disturbances: observed and true values at every decision."""
     swarm = Swarm(load_scenario(scenario, num_vehicles=num_vehicles, overrides=CHANNELS | overrides))
     swarm.reset(seed)
     if swarm.world_map.num_obstacles[0]:
@@ -74,7 +74,7 @@ def frame(swarm):
 
 
 def arrays_of(swarm):
-    """Sub-sectors of each array, and its own among the active ones."""
+    """Sub-sectors of each array, and their indices among the active ones."""
     first, active = 0, 0
     for array in swarm.scenario.sonar.arrays:
         own = array.sub_sectors if array.kind == "active" else 0
@@ -97,8 +97,8 @@ def same(ours, theirs, names=SONAR, where=np.s_[:]):
 # --- Off ---
 
 
-def test_readings_that_are_neither_late_nor_wrong_move_no_bit():
-    """A line that carries the truth: a period of one control hold, and silence that never comes."""
+def test_readings_without_delay_and_error_change_no_bit():
+    """A delay line of true values: a period of one control step, and outages that never begin."""
     _, calm = swim({})
     for overrides in ({"noise.silence_probability": 1e-300}, {"latency.passive_period_s": HOLD}):
         assert not sonar_is_ideal(load_scenario("starter", overrides=overrides))
@@ -110,7 +110,7 @@ def test_readings_that_are_neither_late_nor_wrong_move_no_bit():
 
 
 @pytest.mark.parametrize(("every", "delay", "holds"), [*itertools.product([1.0, 2.5, 7.0], [0, 1, 3, 20], [1, 5])])
-def test_the_readings_taken_are_those_that_a_decision_sees(every, delay, holds):
+def test_the_readings_taken_are_those_that_a_decision_uses(every, delay, holds):
     seen = {latest(decision - delay, every) for decision in range(0, 600, holds)} - {-1}
     taken = {due(hold, every, delay, holds) for hold in range(600)} - {-1}
     assert {m for m in seen if control_step_of(m, every) < 500} == {m for m in taken if control_step_of(m, every) < 500}
@@ -119,7 +119,7 @@ def test_the_readings_taken_are_those_that_a_decision_sees(every, delay, holds):
 @pytest.mark.parametrize(
     "overrides", [LATE, {"latency.processing_s": 0.25}, PINGS, LATE | PINGS, {"latency.processing_s": 2.0}]
 )
-def test_a_late_reading_is_the_past_and_knows_its_age(overrides):
+def test_a_delayed_reading_shows_the_past_with_its_age(overrides):
     swarm, late = swim(overrides)
     _, ideal = swim({})
     latency = swarm.scenario.latency
@@ -140,8 +140,8 @@ def test_a_late_reading_is_the_past_and_knows_its_age(overrides):
 
 
 @pytest.mark.parametrize("reports", ["centre", "surface"])
-def test_a_carried_echo_is_where_the_obstacle_is(reports):
-    """Obstacles stand still, and own motion is known, so that only rounding is left."""
+def test_a_compensated_echo_is_where_the_obstacle_is(reports):
+    """Obstacles are fixed and own motion is known, so that only rounding remains."""
     swarm, frames = swim(CARRIED | {"sonar.echo_reports": reports})
     _, ideal = swim({"sonar.echo_reports": reports})
     x, y, _ = swarm.world_map.obstacles[0, 0]
@@ -163,8 +163,8 @@ def test_a_carried_echo_is_where_the_obstacle_is(reports):
     assert sum((f["echo"] > 0).sum() for f in frames) > 200
 
 
-def test_a_carried_neighbour_is_where_it_was():
-    """Its own motion since is unknown: its place in the world at reception, from the present pose."""
+def test_a_compensated_neighbour_is_where_it_was():
+    """Its own motion since is unknown: its position at reception, in the present body frame."""
     _, frames = swim(CARRIED)
     for t in range(5, len(frames)):
         now, then = frames[t], frames[t - 5]
@@ -175,7 +175,7 @@ def test_a_carried_neighbour_is_where_it_was():
 
 
 def test_sound_shows_vehicles_where_they_were():
-    """R / c before, between control holds on the line between them, and before the reset where they stood."""
+    """R / c before, interpolated between control steps, and before the reset the initial position."""
     _, frames = swim(TRAVEL)
     for t, now in enumerate(frames):
         i, k = np.nonzero(now["detected"])
@@ -205,7 +205,7 @@ def polar(points):
 
 
 def pairs(overrides, field, flag):
-    """Positions as heard and as they are, where both are heard, of vehicles that come to rest; some 10^5."""
+    """Measured and true positions, where both are detected, of vehicles that come to rest; some 10^5."""
     decisions = 300 if flag == "detected" else 1700
     runs = (swim(change, decisions, num_vehicles=54, idle=True)[1] for change in (overrides, {}))
     both = [(a[field], b[field], (a[flag] > 0) & (b[flag] > 0)) for a, b in zip(*runs, strict=True)]
@@ -223,7 +223,7 @@ def is_normal(values, num):
 @pytest.mark.parametrize(
     ("field", "flag", "num"), [("neighbour", "detected", 100_000), ("echo_position", "echo", 90_000)]
 )
-def test_bearings_and_ranges_are_off_as_stated(field, flag, num):
+def test_errors_of_bearings_and_ranges_are_as_given(field, flag, num):
     heard, true = pairs(BLUR, field, flag)
     (away, bearing), (r, psi) = polar(heard), polar(true)
     turn = np.remainder(bearing - psi + math.pi, 2.0 * math.pi) - math.pi
@@ -267,7 +267,7 @@ def test_bearings_alone():
         assert (theirs["ranged"] == 1.0).all()
 
 
-def test_detection_falls_with_range_as_stated():
+def test_the_probability_of_detection_falls_with_range_as_given():
     swarm, heard = swim(DETECTION, 300, num_vehicles=54, idle=True)
     _, there = swim({}, 300, num_vehicles=54, idle=True)
     counted = 0
@@ -290,12 +290,14 @@ def test_detection_falls_with_range_as_stated():
 
 
 @pytest.mark.parametrize(("probability", "length"), [(0.3, 20), (0.05, 5), (0.1, 1), (1.0, 3)])
-def test_silence_begins_as_often_and_lasts_as_long_as_stated(probability, length):
+def test_outages_have_the_given_rate_and_length(probability, length):
     overrides = {"noise.silence_probability": probability, "noise.silence_readings": length}
     swarm = Swarm(load_scenario("starter", num_vehicles=1, overrides=overrides))
     swarm.reset(0)
-    sea, num, silent_at = swarm._disturbances, 100_000, getattr(is_silent, "py_func", is_silent)
-    silent = np.array([silent_at(Reading(0, 1, m, m, 0), 0, sea.keys[0], sea.noise, sea.ears) for m in range(num)])
+    own, num, silent_at = swarm._disturbances, 100_000, getattr(is_silent, "py_func", is_silent)
+    silent = np.array(
+        [silent_at(Reading(0, 1, m, m, 0), 0, own.keys[0], own.noise, own.sensor_errors) for m in range(num)]
+    )
     edges = np.flatnonzero(np.diff(np.concatenate([[0], silent, [0]])))
     assert ((edges[1::2] - edges[::2])[:-1] % length == 0).all()
     bursts = silent.sum() / length
@@ -303,7 +305,7 @@ def test_silence_begins_as_often_and_lasts_as_long_as_stated(probability, length
     assert abs(bursts - probability * chances) <= SIGMAS * math.sqrt(probability * (1.0 - probability) * chances) + 1.0
 
 
-def test_a_silent_array_hears_nothing_and_others_hear_all():
+def test_a_silent_array_detects_nothing_and_the_others_all():
     swarm, frames = swim(SILENCE, 200)
     _, ideal = swim({}, 200)
     quiet = []
@@ -345,7 +347,7 @@ def test_false_echoes_have_their_rate_and_fill_their_sub_sectors(probability):
     assert all((f["who"] == -1).all() and not f["link_identity"].any() for f in frames)
 
 
-def test_a_false_echo_is_heard_only_where_nothing_is_nearer():
+def test_a_false_echo_is_detected_only_where_nothing_is_nearer():
     _, ours = swim(FALSE)
     _, theirs = swim({})
     phantoms = 0
@@ -363,7 +365,7 @@ def test_a_false_echo_is_heard_only_where_nothing_is_nearer():
     assert phantoms > 20
 
 
-def test_a_dead_array_hears_nothing_while_it_is_dead():
+def test_an_array_with_a_fault_detects_nothing():
     swarm, frames = swim(DEAD | FALSE)
     _, others = swim(FALSE)
     hit = {i for i in range(12) if swarm._disturbances.hull.broken[0, i, 0, 0] < 2**62}
@@ -385,7 +387,7 @@ def test_a_dead_array_hears_nothing_while_it_is_dead():
 @pytest.mark.parametrize(
     "other", [DETECTION, SILENCE, DRIFT, COMPASS, DEAD, {"current.variation_mps": 0.0, "current.velocity": "water"}]
 )
-def test_one_disturbance_moves_no_draw_of_bearings_and_ranges(other):
+def test_one_disturbance_changes_no_error_of_bearings_and_ranges(other):
     alone, among = (swim(BLUR | FACTOR | change)[1] for change in ({}, other))
     for flag, field in (("detected", "neighbour"), ("echo", "echo_position")):
         both = [((a[flag] > 0) & (b[flag] > 0), a[field], b[field]) for a, b in zip(alone, among, strict=True)]
@@ -396,7 +398,7 @@ def test_one_disturbance_moves_no_draw_of_bearings_and_ranges(other):
 
 @pytest.mark.parametrize("own", [DETECTION, SILENCE, DEAD])
 @pytest.mark.parametrize("other", [BLUR | FACTOR | DRIFT | COMPASS, BEARINGS])
-def test_one_disturbance_moves_no_draw_of_what_is_missed(own, other):
+def test_one_disturbance_changes_no_missed_detection(own, other):
     for ours, theirs in zip(swim(own)[1], swim(own | other)[1], strict=True):
         same(ours, theirs, ("detected", "echo", "who"))
 
@@ -405,13 +407,13 @@ def test_one_disturbance_moves_no_draw_of_what_is_missed(own, other):
 
 
 def drift_of(frame):
-    """How far off each vehicle believes to be, from where it takes l(t) to be; shape (vehicle, 2)."""
+    """Each vehicle's position error, from its vector to l(t); shape (vehicle, 2)."""
     c, s = np.cos(frame["eta"][:, 2]), np.sin(frame["eta"][:, 2])
     ahead, abeam = frame["reference"].astype(float).T
     return frame["l"][:2] - np.stack([c * ahead - s * abeam, s * ahead + c * abeam], 1) - frame["eta"][:, :2]
 
 
-def test_position_drifts_by_a_share_of_the_way():
+def test_position_drifts_by_a_share_of_the_distance_travelled():
     _, frames = swim(DRIFT, 100, scenario="tracking")
     way = np.zeros(12)
     for before, now in itertools.pairwise(frames):
@@ -424,7 +426,7 @@ def test_position_drifts_by_a_share_of_the_way():
     same(frames[-1], calm[-1], [name for name in calm[-1] if name != "reference"])
 
 
-def test_a_compass_is_off_by_the_same_angle_all_the_time():
+def test_a_compass_has_a_constant_bias():
     _, frames = swim(COMPASS, 50)
     _, calm = swim({}, 50)
     angles = []
@@ -445,8 +447,8 @@ def test_a_compass_is_off_by_the_same_angle_all_the_time():
     )
 
 
-def test_drift_carries_late_readings_along():
-    """Own way is known as navigation has it: readings are carried too far or not far enough, by what drifted since."""
+def test_drift_displaces_compensated_readings():
+    """Own motion is estimated by navigation: readings are displaced by the drift since their reception."""
     _, frames = swim(CARRIED | DRIFT, 60)
     _, true = swim(CARRIED, 60)
     for t in range(5, 61):

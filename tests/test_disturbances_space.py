@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import uuv_marl
-from uuv_marl.baselines import make
+from uuv_marl.baselines import make_policy
 from uuv_marl.benchmark.robustness.axes import AXES, overrides
 
 CELLS = [(axis, level) for axis, told in AXES.items() for level in told.levels]
@@ -20,7 +20,7 @@ def test_observations_stay_finite_and_within_their_space(axis):
         env = uuv_marl.vector_env(WORLDS, "random_field", num_vehicles=VEHICLES, overrides=changes)
         low, high = env.observation_space.low, env.observation_space.high
         observation, _ = env.reset(seed=level)
-        policy, rng = make("bio_inspired", env.scenario, WORLDS), np.random.default_rng(level)
+        policy, rng = make_policy("bio_inspired", env.scenario, WORLDS), np.random.default_rng(level)
         for k in range(DECISIONS):
             action = rng.uniform(-1.0, 1.0, env.action_space.shape).astype(np.float32)
             if k % 40 < 20:

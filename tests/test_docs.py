@@ -16,7 +16,7 @@ from uuv_marl.baselines import POLICIES
 from uuv_marl.cli import app
 from uuv_marl.scenario import Scenario
 from uuv_marl.tasks import TASKS
-from uuv_marl.tasks.maps import KINDS
+from uuv_marl.tasks.maps.kinds import KINDS
 
 pytestmark = pytest.mark.docs
 ROOT = Path(__file__).resolve().parent.parent
@@ -188,7 +188,11 @@ def test_the_table_of_policies_is_right():
     for name, policy in POLICIES.items():
         by = getattr(policy, "identity", False)
         told = [f"with `{by}=true` identity"] if isinstance(by, str) else ["identity"] * by
-        parts = [*policy.channels, *told, *(["yaw damping"] if policy.yaw_damping_nms else [])]
+        parts = [
+            *policy.requirements.channels,
+            *told,
+            *(["yaw damping"] if policy.requirements.yaw_damping_nms else []),
+        ]
         assert needs[name] == (", ".join(parts) or "nothing"), name
 
 

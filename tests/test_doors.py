@@ -16,9 +16,9 @@ from typer.testing import CliRunner
 import uuv_marl
 from tests.nets import ANYWHERE
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, PolicyError, make, with_policy_requirements
+from uuv_marl.baselines import POLICIES, PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import load_checkpoint, save_checkpoint
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.benchmark.results import Results, load_trace
 from uuv_marl.cli import app, main
 from uuv_marl.cli.console import _width, console
@@ -39,7 +39,7 @@ from uuv_marl.sim.vehicle import plant
 def made_for(name, n=5, worlds=2):
     scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=n))
     swarm = Swarm(scenario, worlds)
-    policy = make(name, scenario, worlds)
+    policy = make_policy(name, scenario, worlds)
     policy.reset(0)
     return swarm, policy, swarm.reset(0)
 
@@ -84,7 +84,7 @@ def test_no_number_of_an_observation_is_an_index(name):
 
 def test_a_swarm_too_large_to_assign_slots_is_refused_at_once():
     with pytest.raises(PolicyError, match="at most 2000 vehicles"):
-        make("sdc", with_policy_requirements("sdc", load_scenario("tracking", num_vehicles=2001)))
+        make_policy("sdc", with_policy_requirements("sdc", load_scenario("tracking", num_vehicles=2001)))
 
 
 @pytest.mark.parametrize("active", [[True], np.ones(8), np.ones((8, 1), bool), np.ones(9, bool)])
@@ -192,7 +192,7 @@ def test_divergence_truncates_an_episode_with_finite_numbers(runaway):
 
 
 def test_divergence_never_becomes_a_row_of_results(runaway):
-    events = evaluate(runaway, "bio_inspired", range(3))
+    events = episodes(runaway, "bio_inspired", range(3))
     with pytest.raises(DivergenceError, match="seed 0: vehicle"):
         assert not [event for event in events if isinstance(event, Run)]
 
@@ -252,7 +252,7 @@ def test_every_door_of_a_path_in_python_knows_the_home_folder(home):
     (home / "best").mkdir()
     save_checkpoint("~/best/policy.safetensors", trained.checkpoint.card, trained.checkpoint.tensors)
     for name in ("~/best", "~/best,safety_filter=true", "~/best/policy.safetensors"):
-        assert make(name, with_policy_requirements(name, load_scenario("starter")))
+        assert make_policy(name, with_policy_requirements(name, load_scenario("starter")))
     assert load_checkpoint("~/best").card == trained.checkpoint.card
 
 
@@ -260,7 +260,7 @@ def test_results_and_replays_go_to_the_home_folder(home):
     scenario = load_scenario("starter", overrides={"time_limit.factor": 0.02, "swarm.num_vehicles": 2})
     results = Results("~/results", [scenario])
     results.use("idle")
-    for run in evaluate(scenario, "idle", [0]):
+    for run in episodes(scenario, "idle", [0]):
         if isinstance(run, Run):
             results.add("starter", "idle", run)
     assert load_trace("~/results/traces/starter.idle.0.npz")["time_s"].size

@@ -8,7 +8,7 @@ import pytest
 
 import uuv_marl
 from uuv_marl import load_scenario, uuv_swarm_v1
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.percept import Percept
 from uuv_marl.sim.swarm import Swarm
 
@@ -58,9 +58,9 @@ def test_a_policy_drives_the_environment_as_it_drives_the_swarm(name, scenario):
     losses = {"losses.times_s": [2.0, 4.0, 9.0]} if scenario == "lossy" else {}
     granting = with_policy_requirements(name, load_scenario(scenario, overrides={**SHORT, **losses}))
     env = uuv_marl.parallel_env(granting)
-    through_env = make(name, env)
+    through_env = make_policy(name, env)
     seeds = [11, 12]
-    swarm, batched = Swarm(granting, 2), make(name, granting, 2)
+    swarm, batched = Swarm(granting, 2), make_policy(name, granting, 2)
     percept = swarm.reset(seeds)
     batched.reset(seeds)
     observations, _ = env.reset(seed=12)
@@ -179,7 +179,7 @@ def test_a_seed_is_a_whole_number_everywhere(bad):
     scenario = load_scenario("single_obstacle", num_vehicles=2)
     one = np.ndim(bad) == 0 or not bad
     env = uuv_marl.parallel_env(scenario)
-    for reset in (env.reset, Swarm(scenario).reset, make("random", scenario).reset, uuv_marl.vector_env(1).reset):
+    for reset in (env.reset, Swarm(scenario).reset, make_policy("random", scenario).reset, uuv_marl.vector_env(1).reset):
         with pytest.raises(TypeError, match="seed must be a whole number from 0, got"):
             reset(seed=bad)
     if one:
@@ -187,7 +187,7 @@ def test_a_seed_is_a_whole_number_everywhere(bad):
             uuv_marl.vector_env(bad)
         with pytest.raises(TypeError, match="num_worlds must be a whole number from 1"):
             Swarm(scenario, bad)
-    for reset in (env.reset, Swarm(scenario).reset, make("random", scenario).reset):
+    for reset in (env.reset, Swarm(scenario).reset, make_policy("random", scenario).reset):
         with pytest.raises(ValueError, match="seed must be a whole number from 0, got -1"):
             reset(seed=-1)
 
@@ -230,7 +230,7 @@ def test_the_last_info_tells_how_it_ended(reason):
     scenario = load_scenario("lossy", num_vehicles=4, overrides={**ENDINGS[reason], "timing.decision_period_s": 0.5})
     env, whole = uuv_marl.parallel_env(scenario), uuv_marl.vector_env(1, scenario)
     solo = gymnasium.make("uuv_marl/Solo-v1", scenario=scenario, others="bio_inspired").unwrapped
-    policy = make("bio_inspired", env)
+    policy = make_policy("bio_inspired", env)
     observations, _ = env.reset(seed=4)
     whole.reset(seed=4)
     alone = solo.reset(seed=4)[1]

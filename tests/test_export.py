@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from tests.nets import card_for, saved, tensors
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import POLICIES, PolicyError, make, with_policy_requirements
+from uuv_marl.baselines import POLICIES, PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.export import write_onnx
 from uuv_marl.baselines.learned.trained import Trained
@@ -29,7 +29,7 @@ def test_an_exported_network_acts_as_the_policy_does(arrays, kind, memory, tmp_p
     scenario = with_policy_requirements(best, scenario)
     write_onnx(best, scenario, tmp_path / "policy.onnx")
     onnx.checker.check_model(onnx.load(tmp_path / "policy.onnx"), full_check=True)
-    model, policy = ReferenceEvaluator(str(tmp_path / "policy.onnx")), make(best, scenario)
+    model, policy = ReferenceEvaluator(str(tmp_path / "policy.onnx")), make_policy(best, scenario)
     env = parallel_env(scenario, observe="closeness")
     observations, _ = env.reset(seed=3)
     state = {"state": np.zeros((5, 16), np.float32)} if memory else {}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.baselines import make_policy, with_policy_requirements
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.sim.swarm import Swarm
@@ -66,7 +66,7 @@ def test_the_start_is_turned_at_random_against_the_first_leg_and_clear_of_obstac
 def test_who_does_not_perceive_the_reference_reckons_where_it_is():
     """Its map does not move with it. Random actions, so that it turns and comes to no rest."""
     swarm, rng = water(), np.random.default_rng(3)
-    policy = make("leader_follower", swarm.scenario)
+    policy = make_policy("leader_follower", swarm.scenario)
     swarm.reset(10_001)
     policy.reset(10_001)
     origin = turn = None
@@ -94,7 +94,7 @@ def test_who_does_not_perceive_the_reference_reckons_where_it_is():
 
 def test_newcomers_begin_at_the_references_velocity_for_the_informed_alone():
     swarm = water()
-    policy = make("leader_follower", swarm.scenario)
+    policy = make_policy("leader_follower", swarm.scenario)
     policy.update_memory(swarm.reset(10_002))
     known = policy.memory.known[0] > 0.0
     speed = np.hypot(*np.moveaxis(policy.memory.velocity[0], -1, 0))
@@ -145,7 +145,7 @@ def test_followers_come_along_only_with_the_law_that_is_made_for_it():
     share = {}
     for name in ("leader_follower", "scout"):
         scenario = with_policy_requirements(name, load_scenario("few_informed_easy"))
-        runs = [run for run in evaluate(scenario, name, range(10_000, 10_004)) if isinstance(run, Run)]
+        runs = [run for run in episodes(scenario, name, range(10_000, 10_004)) if isinstance(run, Run)]
         share[name] = np.mean([run.metrics["task"]["uninformed_share"] for run in runs])
     assert share["leader_follower"] > 0.7
     assert share["scout"] < 0.2
@@ -157,7 +157,7 @@ def test_a_swarm_that_amplifies_what_it_hears_goes_at_the_cruise_of_its_follower
     for cruise in (1.0, 2.0):
         name = f"leader_follower,follow=2,cruise={cruise},gather=0,push=0"
         swarm = Swarm(load_scenario("few_informed"), 4)
-        policy, percept = make(name, swarm.scenario, 4), swarm.reset(10_000)
+        policy, percept = make_policy(name, swarm.scenario, 4), swarm.reset(10_000)
         policy.reset(10_000)
         for _ in range(100):
             percept = swarm.step(policy.act(percept))
@@ -182,7 +182,7 @@ def test_who_leads_is_paid_for_who_follows():
 def test_who_has_no_gamma_agent_keeps_its_velocity():
     """The uninformed of Su, Wang and Lin neither brake nor go anywhere by themselves."""
     swarm = Swarm(load_scenario("few_informed", num_vehicles=2, overrides={"task.informed": 1}))
-    policy = make("olfati_saber", swarm.scenario)
+    policy = make_policy("olfati_saber", swarm.scenario)
     swarm.reset(0)
     alone = int(np.flatnonzero(~swarm.world_map.informed[0])[0])
     swarm.state.eta[0, alone, :2] += 5000.0

@@ -7,8 +7,8 @@ from scipy.ndimage import label
 from uuv_marl import load_scenario
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.maps import KINDS
 from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cells, reached
+from uuv_marl.tasks.maps.kinds import KINDS
 
 SEEDS = range(8)
 
@@ -53,7 +53,7 @@ def test_a_map_depends_on_its_seed_alone():
         alone = Swarm(load_scenario("hard_water", overrides=changes))
         alone.reset(40 + w)
         for mine, theirs in (
-            (alone.course, batch.course),
+            (alone.world_map, batch.world_map),
             (alone.state, batch.state),
             (alone.task.memory, batch.task.memory),
         ):
@@ -110,7 +110,7 @@ def test_there_is_along_the_free_way():
     ({"task.kinds": []}, "task.kinds must name some of"),
     ({"task.gate.gap_m": [20.0, 10.0]}, r"task.gate.gap_m must be \[low, high\] with low <= high, got \[20.0, 10.0\]"),
     ({"task.bar.hole_m": 3.0}, "task.bar.hole_m is unknown"),
-    ({"task.length_m": [150.0, 400.0]}, r"task.length_m must leave room for walls .* raise it to at least 167"),
+    ({"task.length_m": [150.0, 400.0]}, r"task.length_m must be at least 167, task.first_wall_m and task.goal_clear_m"),
     ({"task.piles.apart_m": [0.0, 0.0]}, "task.piles.apart_m.0 must lie within 0.001"),
     ({"task.bar.radius_m": [0.0, 2.0]}, "task.bar.radius_m.0 must lie within 0.001"),
 ])  # fmt: skip
@@ -121,6 +121,6 @@ def test_numbers_that_can_not_be_are_refused(changes, message):
 
 def test_knobs_that_leave_no_way_are_refused_with_the_remedy():
     with pytest.raises(
-        ScenarioError, match="of gate, and none can be passed with task.clearance_m = 3; widen the gaps"
+        ScenarioError, match="of gate, none of them with a path at task.clearance_m = 3; widen the gaps"
     ):
         water("gate", **{"task.gate.gap_m": [1.0, 2.0]}).reset(0)

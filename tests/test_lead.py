@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tests.test_memory import room
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.memory.actuators import answer, identify, lead
 from uuv_marl.sim.swarm import Swarm
 
@@ -73,7 +73,7 @@ def test_with_a_lead_vehicles_do_not_swing(overrides, least):
     scenario = with_policy_requirements("scout", load_scenario("tracking", num_vehicles=6, overrides=overrides))
     rates = []
     for share in (0.0, 1.0):
-        swarm, policy, rate = Swarm(scenario), make("scout,preset=plus", scenario, lead=share), []
+        swarm, policy, rate = Swarm(scenario), make_policy("scout,preset=plus", scenario, lead=share), []
         percept = swarm.reset(10_501)
         for k in range(500):
             percept = swarm.step(policy.act(percept))

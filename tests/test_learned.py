@@ -9,11 +9,11 @@ import safetensors.numpy
 
 from tests.nets import card_for, saved, tensors
 from uuv_marl import load_scenario
-from uuv_marl.baselines import PolicyError, make, with_policy_requirements
+from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint, vehicle_of
 from uuv_marl.baselines.learned.layers import ENCODED, Architecture, Network, NumpyOps, columns, shapes
 from uuv_marl.baselines.registry import policy_class
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.benchmark.results import policy_info
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
@@ -128,8 +128,8 @@ def test_torch_and_numpy_give_the_same(kind, memory):
 def test_a_run_depends_on_its_seed_alone(kind, memory, n, tmp_path):
     best = saved(tmp_path, water(), kind=kind, memory=memory)
     scenario = with_policy_requirements(best, load_scenario("tracking", num_vehicles=n, overrides=SHORT))
-    together = {e.seed: e for e in evaluate(scenario, best, [4, 5, 6]) if isinstance(e, Run)}
-    (alone,) = (e for e in evaluate(scenario, best, [5]) if isinstance(e, Run))
+    together = {e.seed: e for e in episodes(scenario, best, [4, 5, 6]) if isinstance(e, Run)}
+    (alone,) = (e for e in episodes(scenario, best, [5]) if isinstance(e, Run))
     assert together[5].metrics == alone.metrics
     np.testing.assert_array_equal(together[5].routes.position, alone.routes.position)
 
@@ -137,16 +137,16 @@ def test_a_run_depends_on_its_seed_alone(kind, memory, n, tmp_path):
 def test_a_memory_can_be_kept_and_is_forgotten_at_a_reset(tmp_path):
     best = saved(tmp_path, water(), memory=True)
     scenario = with_policy_requirements(best, load_scenario("tracking", num_vehicles=4))
-    swarm, policy = Swarm(scenario, 2), make(best, scenario, 2)
+    swarm, policy = Swarm(scenario, 2), make_policy(best, scenario, 2)
     percept = swarm.reset([1, 2])
     first = policy.act(percept).copy()
     for _ in range(5):
         percept = swarm.step(policy.act(percept))
     kept, action = policy.snapshot(), policy.act(percept).copy()
-    other = make(best, scenario, 2)
+    other = make_policy(best, scenario, 2)
     other.restore(kept)
     np.testing.assert_array_equal(other.act(percept), action)
-    forgetful = make(best, scenario, 2).act(percept)
+    forgetful = make_policy(best, scenario, 2).act(percept)
     assert np.abs(forgetful - action).max() > 1e-3
     np.testing.assert_array_equal(policy.act(swarm.reset([1, 2])), first)
 
@@ -160,8 +160,8 @@ def test_what_decides_beside_a_network_is_told_and_acts(beside, told, tmp_path):
     scenario = load_scenario("starter")
     best = saved(tmp_path, scenario, scale=0.0, **beside)
     assert load_checkpoint(best).card.policy_class == told
-    policy, swarm = make(best, scenario), Swarm(scenario)
-    law = make(beside.get("base_controller", "idle,safety_filter=true" if beside else "idle"), scenario)
+    policy, swarm = make_policy(best, scenario), Swarm(scenario)
+    law = make_policy(beside.get("base_controller", "idle,safety_filter=true" if beside else "idle"), scenario)
     percept = swarm.reset(3)
     for _ in range(30):
         action = policy.act(percept)
@@ -178,9 +178,9 @@ def test_it_works_for_any_size_and_declares_what_it_needs(best):
     assert policy_info(best) == known
     for n in (1, 200):
         scenario = with_policy_requirements(best, load_scenario("tracking", num_vehicles=n))
-        assert make(best, scenario).act(Swarm(scenario).reset(0)).shape == (1, n, 2)
+        assert make_policy(best, scenario).act(Swarm(scenario).reset(0)).shape == (1, n, 2)
     with pytest.raises(PolicyError, match="yaw damping of 600.*granted"):
-        make(best, load_scenario("tracking"))
+        make_policy(best, load_scenario("tracking"))
 
 
 def test_another_percept_or_period_is_refused_with_the_remedy(best):
@@ -188,7 +188,7 @@ def test_another_percept_or_period_is_refused_with_the_remedy(best):
     other = with_policy_requirements(best, water(**{"sonar.arrays.bow.sub_sectors": 5}))
     message = r"another percept.*was .'closeness', 21, '1', 1.0. in .* is .'closeness', 19, '1', 1.0. here; use"
     with pytest.raises(PolicyError, match=message):
-        make(best, other)
+        make_policy(best, other)
     slow = water(**{"timing.decision_period_s": 0.5})
     assert with_policy_requirements(best, slow).timing.decision_period_s == 0.1
     fixed = with_policy_requirements(best, water(**{"timing.decision_period_s": 0.5, "timing.fixed": True}))
@@ -197,26 +197,26 @@ def test_another_percept_or_period_is_refused_with_the_remedy(best):
         with_policy_requirements(best, water(**odd))
     for other in (slow, fixed):
         with pytest.raises(PolicyError, match=r"needs a decision every 0.1 s .timing.decision_period_s."):
-            make(best, other)
+            make_policy(best, other)
 
 
 def test_what_is_no_checkpoint_is_explained(best, tmp_path):
     with pytest.raises(PolicyError, match="can't be read.*give a checkpoint"):
-        make(str(tmp_path / "nowhere"), load_scenario("tracking"))
+        make_policy(str(tmp_path / "nowhere"), load_scenario("tracking"))
     (tmp_path / "bad").write_bytes(b"\x80\x04pickled")
     with pytest.raises(PolicyError, match="holds no policy of uuv_marl"):
-        make(str(tmp_path / "bad"), load_scenario("tracking"))
+        make_policy(str(tmp_path / "bad"), load_scenario("tracking"))
     (tmp_path / "other").write_bytes(safetensors.numpy.save({"x": np.zeros(2, np.float32)}))
     with pytest.raises(PolicyError, match="holds no policy of uuv_marl"):
-        make(str(tmp_path / "other"), load_scenario("tracking"))
+        make_policy(str(tmp_path / "other"), load_scenario("tracking"))
     with pytest.raises(PolicyError, match="did you mean 'bio_inspired'.*paths of checkpoints"):
-        make("bio_inspred", load_scenario("tracking"))
+        make_policy("bio_inspred", load_scenario("tracking"))
 
 
 def test_a_rewritten_checkpoint_is_loaded_anew(best):
-    assert policy_class(best).yaw_damping_nms == 600.0
+    assert policy_class(best).requirements.yaw_damping_nms == 600.0
     saved(Path(best), water(**{"actuators.yaw_damping_nms": 100.0}))
-    assert policy_class(best).yaw_damping_nms == 100.0
+    assert policy_class(best).requirements.yaw_damping_nms == 100.0
 
 
 @pytest.mark.parametrize(("field", "value"), [("vehicle.m_kg", 600.0), ("actuators.lever_arm_m", 2.0)])
@@ -228,16 +228,16 @@ def test_another_vehicle_is_refused_unless_asked_for(name, field, value, best):
     told = f"{field} was {was} in the training and is {value} here"
     message = f"another vehicle than scenario 'tracking' has: {told}.*any_vehicle=True"
     with pytest.raises(PolicyError, match=message):
-        make(name, other)
-    assert make(name, other, any_vehicle=True).act(Swarm(other).reset(0)).shape == (1, 2, 2)
+        make_policy(name, other)
+    assert make_policy(name, other, any_vehicle=True).act(Swarm(other).reset(0)).shape == (1, 2, 2)
 
 
 def test_a_checkpoint_runs_on_the_vehicle_that_it_was_trained_on(best):
     heavy = water(**{"vehicle.m_kg": 600.0})
     saved(Path(best), heavy)
-    make(best, with_policy_requirements(best, heavy))
+    make_policy(best, with_policy_requirements(best, heavy))
     with pytest.raises(PolicyError, match=r"vehicle.m_kg was 600.0 in the training and is 185.0"):
-        make(best, with_policy_requirements(best, load_scenario("tracking")))
+        make_policy(best, with_policy_requirements(best, load_scenario("tracking")))
 
 
 def changed(name, value=None, at=None, **more):
@@ -268,7 +268,7 @@ def test_weights_that_cannot_run_are_refused(made, message, tmp_path):
     own, more = made
     save_checkpoint(tmp_path / "bad", card_for(water(), **more), own)
     with pytest.raises(PolicyError, match=f"bad holds no policy of uuv_marl .{message}"):
-        make(str(tmp_path / "bad"), load_scenario("tracking"))
+        make_policy(str(tmp_path / "bad"), load_scenario("tracking"))
 
 
 @pytest.mark.parametrize(
@@ -288,4 +288,4 @@ def test_cards_that_say_nothing_sensible_are_refused(field, value, tmp_path):
     said = json.dumps({**card.model_dump(mode="json"), field: value})
     (tmp_path / "bad").write_bytes(safetensors.numpy.save(tensors(card), {"uuv_marl": said}))
     with pytest.raises(PolicyError, match=f"bad holds no policy of uuv_marl .its card's {field}"):
-        make(str(tmp_path / "bad"), load_scenario("tracking"))
+        make_policy(str(tmp_path / "bad"), load_scenario("tracking"))

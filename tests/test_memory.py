@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import age_of
 from uuv_marl.baselines.memory.response import follow, remains
@@ -43,7 +43,7 @@ def run(overrides, seconds=140.0, policy="scout", seed=10_500):
     confirmed discs that are no obstacle, and of the obstacles within 20 m that are not remembered.
     """
     scenario = with_policy_requirements(policy, load_scenario("single_obstacle", overrides=COURSE | overrides))
-    swarm, acts = Swarm(scenario), make(policy, scenario)
+    swarm, acts = Swarm(scenario), make_policy(policy, scenario)
     percept, period = swarm.reset(seed), scenario.timing.decision_period_s
     errors = {name: [] for name in ("place", "turn", "centre", "surface", "velocity")}
     found, missed, phantoms, discs, turn, origin = 0, 0, 0, 0, None, None
@@ -123,7 +123,7 @@ def test_what_remains_is_found_from_any_actions(a, share, drift, seed):
 def room():
     """What one vehicle remembers of nothing."""
     scenario = with_policy_requirements("scout", load_scenario("tracking", num_vehicles=1))
-    return make("scout", scenario).memory
+    return make_policy("scout", scenario).memory
 
 
 @pytest.mark.parametrize("echoes", ["centre", "surface"])
@@ -163,7 +163,7 @@ def test_obstacles_are_known_in_a_disturbed_sea(disturbance, median, worst, phan
 
 def test_an_obstacle_that_is_gone_is_forgotten():
     scenario = with_policy_requirements("scout", load_scenario("single_obstacle", num_vehicles=1))
-    swarm, policy = Swarm(scenario), make("scout", scenario)
+    swarm, policy = Swarm(scenario), make_policy("scout", scenario)
     percept = swarm.reset(0)
     while not (policy.memory.score[0, 0] >= 20.0).any():
         percept = swarm.step(policy.act(percept))
@@ -183,7 +183,7 @@ def test_a_reference_that_turns_little_by_little_does_not_turn_the_map(speed):
     scenario = with_policy_requirements(
         "proportional_tracking,safety_filter=true", load_scenario("tracking", num_vehicles=1, overrides=overrides)
     )
-    swarm, policy = Swarm(scenario), make("proportional_tracking,safety_filter=true", scenario)
+    swarm, policy = Swarm(scenario), make_policy("proportional_tracking,safety_filter=true", scenario)
     percept = swarm.reset(1)
     for k in range(400):
         action = policy.act(percept)
@@ -199,7 +199,7 @@ def test_a_fix_that_is_cut_is_none():
     scenario = with_policy_requirements(
         "proportional_tracking,safety_filter=true", load_scenario("tracking", num_vehicles=1)
     )
-    swarm, policy = Swarm(scenario), make("proportional_tracking,safety_filter=true", scenario)
+    swarm, policy = Swarm(scenario), make_policy("proportional_tracking,safety_filter=true", scenario)
     swarm.reset(0)
     swarm.state.eta[0, 0, :2] = (-9000.0, 5000.0)
     percept = swarm.observe()
@@ -216,7 +216,7 @@ def test_a_fix_that_is_cut_is_none():
 def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(memory_s):
     """Two vehicles at rest, beside each other; then one is gone."""
     scenario = with_policy_requirements("scout", load_scenario("tracking", num_vehicles=2))
-    swarm, policy = Swarm(scenario), make("scout", scenario, memory_s=memory_s)
+    swarm, policy = Swarm(scenario), make_policy("scout", scenario, memory_s=memory_s)
     swarm.reset(0)
     swarm.state.eta[0, 1, :2] = swarm.state.eta[0, 0, :2] + 20.0
     policy.act(swarm.observe())
@@ -242,7 +242,7 @@ def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(memor
 )
 def test_vehicles_doubt_where_something_is_not_as_expected(overrides, least, most):
     scenario = with_policy_requirements("scout", load_scenario("random_field", num_vehicles=20, overrides=overrides))
-    swarm, policy, doubts = Swarm(scenario), make("scout", scenario), []
+    swarm, policy, doubts = Swarm(scenario), make_policy("scout", scenario), []
     percept, decisions = swarm.reset(10_007), round(40.0 / scenario.timing.decision_period_s)
     for k in range(decisions):
         percept = swarm.step(policy.act(percept))

@@ -1,4 +1,4 @@
-"""Of hundreds of obstacles only those near are gone through: facts and echoes are those of going through all."""
+"""Of hundreds of obstacles only near ones are examined: facts and echoes are as with all of them."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ BEHIND = [{"name": name, "kind": "active", "mounting_deg": mounting, "aperture_d
 
 
 def among_piles(period_s, seed, **changes):
-    """Coasting vehicles at random places among hundreds of discs, a third of which move; some leave all they knew."""
+    """Coasting vehicles among hundreds of discs, a third of which move; some leave all that they remembered."""
     changes |= {"timing.decision_period_s": period_s}
     swarm = Swarm(load_scenario("hard_water", num_vehicles=30, overrides=PILES | changes), 1)
     swarm.reset(10_000 + seed)
@@ -44,7 +44,7 @@ def check_echoes(swarm):
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("stops", [True, False])
 def test_facts_are_those_of_all_pairs(seed, stops):
-    """Each control hold beside the oracle, and decisions of twenty holds beside what was so in these holds."""
+    """Each control step against the oracle, and decisions of twenty against the facts of these control steps."""
     calm = {"collision.stops": stops, "actuators.yaw_damping_nms": 0.0}
     by_hold, by_many = (among_piles(period_s, seed, **calm) for period_s in (0.1, 2.0))
     alive, ahead = np.ones(30, bool), np.zeros((1, 30, 2), np.float32)
@@ -52,10 +52,10 @@ def test_facts_are_those_of_all_pairs(seed, stops):
     for _ in range(2):
         clearance, reached, contacts = np.full(30, np.inf), np.inf, np.zeros(30, int)
         for _ in range(20):
-            num, before = by_hold.course.num_obstacles[0], by_hold.state.eta[0, :, :2].copy()
-            discs_before = by_hold.course.obstacles[0, :num].copy()
+            num, before = by_hold.world_map.num_obstacles[0], by_hold.state.eta[0, :, :2].copy()
+            discs_before = by_hold.world_map.obstacles[0, :num].copy()
             by_hold.step(ahead)
-            now, discs = by_hold.state.eta[0, :, :2], by_hold.course.obstacles[0, :num]
+            now, discs = by_hold.state.eta[0, :, :2], by_hold.world_map.obstacles[0, :num]
             nearest, nearest_vehicle, _ = sonar.obstacles(now, before, alive, HULL, discs)
             gap, was = (np.sqrt(sonar.between(places, those)[1]) - those[:, 2]
                         for places, those in ((now, discs), (before, discs_before)))  # fmt: skip
@@ -85,17 +85,17 @@ def test_echoes_are_those_of_all_discs(arrays, report):
     check_echoes(swarm)
 
 
-def test_a_stopped_hull_is_where_few_discs_leave_it():
-    """Beside a world that knows only the discs around, so few that all are gone through."""
+def test_a_hull_stops_where_it_stops_among_few_discs():
+    """Against a world that has only the discs around, so few that all are examined."""
     many = among_piles(0.5, 7)
-    many.course.obstacle_velocity[:] = 0.0
+    many.world_map.obstacle_velocity[:] = 0.0
     many.state.eta[0, 1:, :2] += 3000.0 + 50.0 * np.arange(58).reshape(29, 2)  # one vehicle among the discs
     many.state.nu[0, 0] = (6.0, 0.5, 0.2)
     few = among_piles(0.5, 7)
     few.restore(many.snapshot())
-    discs = many.course.obstacles[0, : many.course.num_obstacles[0]]
+    discs = many.world_map.obstacles[0, : many.world_map.num_obstacles[0]]
     order = np.argsort(np.hypot(*(discs[:, :2] - many.state.eta[0, 0, :2]).T) - discs[:, 2], kind="stable")
-    few.course.obstacles[0, :16], few.course.num_obstacles[0] = discs[np.sort(order[:16])], 16
+    few.world_map.obstacles[0, :16], few.world_map.num_obstacles[0] = discs[np.sort(order[:16])], 16
     for swarm in (many, few):
         swarm.observe()
     for t in range(20):

@@ -7,7 +7,10 @@ from hypothesis import strategies as st
 
 import uuv_marl
 from tests.players import CYCLES, PLAYERS, compare, suited
-from uuv_marl.baselines import PolicyError, make
+from uuv_marl import load_scenario
+from uuv_marl.baselines import PolicyError, make_policy
+from uuv_marl.benchmark.evaluate import Run, episodes
+from uuv_marl.scenario import ScenarioError
 
 LOSES = {"losses.times_s": [1.0, 2.0], "timing.decision_period_s": 0.5}
 KINDS = {
@@ -33,7 +36,7 @@ def test_the_same_actions_through_every_interface(name, player, seed, pattern):
 
 def test_a_second_call_changes_nothing_and_a_left_out_decision_is_refused():
     env = uuv_marl.parallel_env(suited("scout", "starter"))
-    policy = make("scout", env)
+    policy = make_policy("scout", env)
     observations, _ = env.reset(seed=0)
     first = policy(observations)
     assert all(np.array_equal(first[agent], again) for agent, again in policy(observations).items())
@@ -49,7 +52,7 @@ def test_a_wrapper_that_changes_one_observation_is_obeyed_one_agent_at_a_time():
     """What uuv_1 hears goes, after uuv_0 has acted: as if all had been given at once."""
     scenario = suited("scout", "starter")
     whole, single = (uuv_marl.parallel_env(scenario) for _ in range(2))
-    together, alone = make("scout", whole), make("scout", single)
+    together, alone = make_policy("scout", whole), make_policy("scout", single)
     observations, _ = whole.reset(seed=3)
     single.reset(seed=3)
     for _ in range(40):
@@ -63,7 +66,7 @@ def test_a_wrapper_that_changes_one_observation_is_obeyed_one_agent_at_a_time():
 
 def test_random_actions_follow_the_seed_of_the_episode_unless_they_have_one():
     env = uuv_marl.parallel_env("starter")
-    policy = make("random", env)
+    policy = make_policy("random", env)
 
     def first(seed):
         return policy(env.reset(seed=seed)[0])["uuv_0"].tolist()
@@ -79,13 +82,24 @@ def test_random_actions_follow_the_seed_of_the_episode_unless_they_have_one():
 def test_what_does_not_fit_is_named():
     env = uuv_marl.vector_env(2, "starter")
     observations, _ = env.reset(seed=0)
-    policy = make("bio_inspired", env)
+    policy = make_policy("bio_inspired", env)
     with pytest.raises(PolicyError, match=r"shape that the environment gives them, for instance \(2, 5, 98\)"):
         policy(observations[0])
     with pytest.raises(PolicyError, match="no agent 'uuv_0'; it takes an array"):
         policy({"uuv_0": observations[0, 0]})
     env = uuv_marl.parallel_env("starter")
     with pytest.raises(PolicyError, match="no agent 'x'; agents are uuv_0 to uuv_4"):
-        make("bio_inspired", env)({"x": env.reset()[0]["uuv_0"]})
+        make_policy("bio_inspired", env)({"x": env.reset()[0]["uuv_0"]})
     with pytest.raises(PolicyError, match="make the environment with observe='positions'"):
-        make("bio_inspired", uuv_marl.vector_env(2, observe="closeness"))
+        make_policy("bio_inspired", uuv_marl.vector_env(2, observe="closeness"))
+
+
+def test_evaluate_gives_a_dictionary_of_metrics_for_each_seed_in_their_order():
+    short = {"time_limit.factor": 0.01, "time_limit.extra_s": 3.0}
+    results = uuv_marl.evaluate("sdc", "starter", [5, 3], num_vehicles=3, overrides=short)
+    assert [result["seed"] for result in results] == [5, 3]
+    scenario = load_scenario("starter", num_vehicles=3, overrides=short)
+    runs = episodes(uuv_marl.with_policy_requirements("sdc", scenario), "sdc", [3])
+    assert [results[1]] == [{"seed": 3, **run.metrics} for run in runs if isinstance(run, Run)]
+    with pytest.raises(ScenarioError, match="yaw_damping_nms can't be 7: policy 'sdc' requires 600; leave it out"):
+        uuv_marl.evaluate("sdc", "tracking", [0], overrides={"actuators.yaw_damping_nms": 7.0})

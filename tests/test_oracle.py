@@ -1,4 +1,4 @@
-"""The simulation against ``tests/oracle``, the paper's equations by another hand; and the same bits uncompiled."""
+"""The simulation against ``tests/oracle``, an independent implementation of the paper; the same bits uncompiled."""
 
 import functools
 import json
@@ -18,7 +18,7 @@ from tests.conftest import COUPLED, LIFT, RUDDER
 from tests.golden import STARTER
 from tests.oracle import motion, sonar
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make
+from uuv_marl.baselines import make_policy
 from uuv_marl.sim.cells import ONE_CELL_UP_TO, fit, max_cells
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin, rotated
@@ -31,13 +31,13 @@ GRIDS = [n for n in SIZES if n > ONE_CELL_UP_TO]
 
 @pytest.mark.parametrize("overrides", [{}, contract.SEA])
 def test_without_a_compiler_a_run_is_the_same(overrides):
-    """Under NUMBA_DISABLE_JIT=1; policies decide the same but for rounding to float32 in between."""
+    """Under NUMBA_DISABLE_JIT=1; actions of policies differ only by rounding to float32."""
     run = """
 import json, sys
 import numpy as np
 from uuv_marl import load_scenario
 from tests.nets import ANYWHERE
-from uuv_marl.baselines import granted, make
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.sim.swarm import Swarm
 scenario = load_scenario("starter", overrides=json.loads(sys.argv[1]))
 swarm = Swarm(scenario, 2)
@@ -47,7 +47,8 @@ for _ in range(8):
 bits = {name: array.tobytes().hex() for name, array in swarm.snapshot().items()}
 actions = []
 for name in () if scenario.current.flows else ANYWHERE:
-    swarm, policy = Swarm(with_policy_requirements(name, scenario)), make(name, with_policy_requirements(name, scenario))
+    own = with_policy_requirements(name, scenario)
+    swarm, policy = Swarm(own), make_policy(name, own)
     policy.reset(0)
     actions.append(policy.act(swarm.reset(0)).tolist())
 print(json.dumps([bits, actions]))
@@ -97,13 +98,13 @@ def fleet(clock):
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1.0, 1e-6]), st.booleans())
 def test_vehicles_move_as_the_paper_says_from_any_state(clock, seed, size, astern):
     rng, swarm = np.random.default_rng(seed), fleet(clock)
-    n, state, sea = swarm.num_vehicles, swarm.state, swarm._disturbances
+    n, state, disturbances = swarm.num_vehicles, swarm.state, swarm._disturbances
     state.eta[0, :, :2], state.eta[0, :, 2] = rng.uniform(-1000, 1000, (n, 2)), rng.uniform(-math.pi, math.pi, n)
     if astern:  # where the heading wraps
         state.eta[0, :, 2] = math.pi * (1.0 - 10.0 ** rng.uniform(-16, -1, n)) * rng.choice([-1, 1], n)
     state.nu[0] = rng.uniform(-1, 1, (n, 3)) * [6, 3, 3] * size
     swarm.observe()
-    given = np.zeros((n, 2)) if sea is None else sea.hull.tau[0].copy()
+    given = np.zeros((n, 2)) if disturbances is None else disturbances.hull.tau[0].copy()
     if swarm.scenario.actuators.kind == "rudder":
         given[:, 1] *= math.copysign(1.0, swarm.scenario.actuators.N_uud)
     action = (rng.uniform(-1.5, 1.5, (1, n, 2)) * size).astype(np.float32)
@@ -283,7 +284,7 @@ DISCS = ((40.0, 30.0, 25.0), (-80.0, 20.0, 10.0), (50.5, 50.5, 0.3), (150.0, -20
 
 @functools.cache
 def world(suite, n):
-    """A world to be filled by hand."""
+    """A world to be filled by the test."""
     changes = {"sonar.obstacles_hide_vehicles": suite == "hiding"}
     if SUITES[suite]:
         changes["sonar.arrays"] = SUITES[suite]
@@ -311,7 +312,7 @@ def fill(swarm, layout, seed):
 
 
 def check(swarm):
-    """Distances, contacts and whom each vehicle hears, as the oracle has them."""
+    """Compare distances, collisions and detections with the oracle's."""
     facts, alive, hull = swarm.facts, swarm.state.alive[0], swarm.scenario.collision.hull_radius_m
     eta, now, before = swarm.state.eta[0], swarm.state.eta[0, :, :2], swarm.state.before[0]
     discs, heading = swarm.world_map.obstacles[0, : swarm.world_map.num_obstacles[0]], swarm.heading[0]
@@ -335,7 +336,7 @@ def check(swarm):
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
 @pytest.mark.parametrize("suite", SUITES)
-def test_neighbours_distances_and_contacts_are_those_of_the_oracle(suite, layout):
+def test_neighbours_distances_and_collisions_are_those_of_the_oracle(suite, layout):
     for n in SIZES if suite == "as set" else (1, 2, 3, 54, 300) if suite == "hiding" else (3, 54, 300):
         for seed in range({300: 2, 600: 1}.get(n, 4)):
             swarm = world(suite, n)
@@ -343,7 +344,7 @@ def test_neighbours_distances_and_contacts_are_those_of_the_oracle(suite, layout
             check(swarm)
 
 
-def test_a_bearing_on_an_edge_along_the_border_of_a_cell_is_heard():
+def test_a_bearing_on_an_edge_along_the_border_of_a_cell_is_detected():
     """Far from the listener, where rounding puts the sub-sector's edge into the next row or column of cells."""
     n, cell = 300, 16.25
     for mounting in np.arange(-166.0, -158.0) + 0.3:
@@ -399,31 +400,31 @@ def test_large_swarms_have_a_grid_of_bounded_size_and_small_ones_one_cell(layout
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
-def test_one_lost_vehicle_more_calls_for_a_grid_and_changes_nothing(layout):
+def test_one_more_lost_vehicle_requires_a_grid_and_changes_nothing(layout):
     few, more = world("as set", ONE_CELL_UP_TO), world("as set", ONE_CELL_UP_TO + 1)
     few.state.nu[0] = 0.0
     fill(few, layout, 7)
     for ours, theirs in zip(more.state[:4], few.state[:4], strict=True):
         ours[0, :-1] = theirs[0]
     more.state.alive[0, -1] = False
-    more.course.obstacles[0] = more.state.obstacles_before[0] = few.course.obstacles[0]
+    more.world_map.obstacles[0] = more.state.obstacles_before[0] = few.world_map.obstacles[0]
     more.observe()
-    np.testing.assert_array_equal(more.heard[0, :-1], few.heard[0])
+    np.testing.assert_array_equal(more.detected_index[0, :-1], few.detected_index[0])
     np.testing.assert_array_equal(more.percept.flat[0, :-1], few.percept.flat[0])
     np.testing.assert_array_equal(more.facts.spacing[0, :-1], few.facts.spacing[0])
     np.testing.assert_array_equal(more.facts.vehicle_collisions[0, :-1], few.facts.vehicle_collisions[0])
     assert more.facts.max_spacing[0] == few.facts.max_spacing[0]
 
 
-def test_a_vehicle_at_rest_on_a_hull_s_distance_from_an_obstacle_never_touches_it():
-    """Where two ways of computing a distance differ by an ulp, an old gap must not count as a new contact."""
+def test_a_vehicle_at_rest_at_a_hull_s_radius_from_an_obstacle_never_collides():
+    """Where two ways of computing a distance differ by an ulp, an old gap must not count as a new collision."""
     offset = np.random.default_rng(0).uniform(20, 40, (10000, 2))
     x, y = next((x, y) for x, y in offset if math.sqrt(x * x + y * y) < math.hypot(x, y))
     disc = {"centre_m": [9e3, 9e3], "radius_m": 1.0}
     one = Swarm(load_scenario(BASE, num_vehicles=1, overrides={"obstacles": [disc]}))
     one.reset(0)
-    one.state.eta[0], one.state.nu[0], one.course.obstacles[0, 0] = 0.0, 0.0, (x, y, math.hypot(x, y) - 1.0)
-    one.state.obstacles_before[...] = one.course.obstacles
+    one.state.eta[0], one.state.nu[0], one.world_map.obstacles[0, 0] = 0.0, 0.0, (x, y, math.hypot(x, y) - 1.0)
+    one.state.obstacles_before[...] = one.world_map.obstacles
     for _ in range(3):
         one.step(np.zeros((1, 1, 2), np.float32))
         assert one.facts.collisions[0] == 0
@@ -468,7 +469,7 @@ EPISODES = {
 
 
 def crowd(swarm, rng):
-    """Vehicles about to touch an obstacle or each other, on one spot, inside an obstacle; headings beyond pi."""
+    """Vehicles about to hit an obstacle or each other, on one spot, inside an obstacle; headings beyond pi."""
     state, n = swarm.state, swarm.num_vehicles
     x, y, radius = swarm.world_map.obstacles[0, 0] if swarm.world_map.num_obstacles[0] else (50.0, 20.0, 10.0)
     angle = rng.uniform(-math.pi, math.pi, n)
@@ -482,7 +483,7 @@ def crowd(swarm, rng):
 
 
 def check_percept(swarm):
-    """Every field of the percepts, as the oracle has it; zero for the lost."""
+    """Compare every field of the percepts with the oracle's; 0 for lost vehicles."""
     percept, heading, nu = swarm.percept, swarm.heading[0], swarm.state.nu[0]
     now, alive, discs = swarm.state.eta[0, :, :2], swarm.state.alive[0], swarm.world_map.obstacles[0]
     discs, l_t = discs[: swarm.world_map.num_obstacles[0]], swarm.facts.reference[0, 0]
@@ -508,7 +509,7 @@ def check_percept(swarm):
 def test_an_episode_s_facts_and_percepts_are_those_of_the_oracle(name):
     scenario, change = EPISODES[name]
     scenario = load_scenario(scenario, **change)
-    swarm, actor, rng = Swarm(scenario), make("bio_inspired", scenario), np.random.default_rng(0)
+    swarm, actor, rng = Swarm(scenario), make_policy("bio_inspired", scenario), np.random.default_rng(0)
     swarm.reset(1)
     actor.reset(1)
     happened = set()

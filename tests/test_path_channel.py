@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import PolicyError, make, with_policy_requirements
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.maps import KINDS
+from uuv_marl.tasks.maps.kinds import KINDS
 
 FIRST = 10_000
 
@@ -21,7 +21,7 @@ def told(kinds=tuple(KINDS), vehicles=10, **changes):
 
 def flown(scenario, worlds, decisions):
     """A swarm that the oracle has led for a while."""
-    swarm, policy = Swarm(scenario, worlds), make("oracle", scenario, worlds)
+    swarm, policy = Swarm(scenario, worlds), make_policy("oracle", scenario, worlds)
     percept = swarm.reset(FIRST)
     for _ in range(decisions):
         percept = swarm.step(policy.act(percept))
@@ -32,7 +32,7 @@ def flown(scenario, worlds, decisions):
     ("kind", "vehicles"), [*((kind, 10) for kind in KINDS), ("gate", 54), ("forest", 54), ("harbour", 54)]
 )
 def test_the_oracle_passes_every_kind_of_map_and_touches_nothing(kind, vehicles):
-    runs = [e for e in evaluate(told([kind], vehicles), "oracle", range(FIRST, FIRST + 4)) if isinstance(e, Run)]
+    runs = [e for e in episodes(told([kind], vehicles), "oracle", range(FIRST, FIRST + 4)) if isinstance(e, Run)]
     assert np.mean([run.metrics["task"]["success_share"] for run in runs]) >= 0.95
     assert max(run.metrics["task"]["time_ratio"] for run in runs) < 2.0
 
@@ -92,15 +92,15 @@ def test_a_channel_that_the_task_lacks_is_refused_with_the_remedy():
         load_scenario("hard_water", overrides={"sonar.channels": ["wya"]})
     for name in ("starter", "hard_water"):
         with pytest.raises(PolicyError, match="Oracle needs the channels way and link"):
-            make("oracle", load_scenario(name))
+            make_policy("oracle", load_scenario(name))
 
 
 def test_the_oracle_works_by_observations_alone():
     scenario = told()
     env, swarm = parallel_env(scenario), Swarm(scenario)
     observations, _ = env.reset(seed=FIRST)
-    actions = make("oracle", env)(observations)
-    expected = make("oracle", scenario).act(swarm.reset(FIRST))[0]
+    actions = make_policy("oracle", env)(observations)
+    expected = make_policy("oracle", scenario).act(swarm.reset(FIRST))[0]
     np.testing.assert_array_equal(np.stack(list(actions.values())), expected)
 
 

@@ -1,4 +1,4 @@
-"""Draws as a function of where they are used: known answers, distributions, and that nothing else moves."""
+"""Counter-based random numbers: known answers, distributions, and independence of other generators."""
 
 import math
 
@@ -55,7 +55,7 @@ def test_distributions_and_independence():
 
 
 @given(st.integers(0, 2**64 - 1), st.tuples(WORD, WORD, WORD, WORD))
-def test_a_draw_is_a_function_of_its_place(key, place):
+def test_a_number_is_a_function_of_its_counter(key, place):
     first = random.uniforms(np.uint64(key), *place)
     assert random.uniforms(np.uint64(key), *place) == first
     assert random.uniform(np.uint64(key), *place) == first[0]
@@ -69,7 +69,7 @@ def test_logarithm(x):
     assert random.log(x) == pytest.approx(math.log(x), rel=5e-16, abs=1e-18)
 
 
-def test_keys_belong_to_episodes_and_move_no_draw():
+def test_keys_belong_to_episodes_and_change_no_sample():
     scenario = load_scenario("random_field", num_vehicles=3)
     batch, alone = Swarm(scenario, 3), Swarm(scenario)
     batch.reset(7)

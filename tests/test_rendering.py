@@ -8,7 +8,7 @@ import pytest
 
 import uuv_marl
 from tests.golden import STARTER
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, aim
@@ -24,7 +24,7 @@ SIZE = (600, 500)
 def played(scenario=STARTER, policy="bio_inspired", seconds=10.0, sonar_of=None, seed=0, **changes):
     """The scene of an episode after some seconds, its worlds and its memory."""
     batch = make_batched_env(with_policy_requirements(policy, uuv_marl.load_scenario(scenario, **changes)))
-    actor = make(policy, batch.swarm.scenario)
+    actor = make_policy(policy, batch.swarm.scenario)
     batch.reset(seed)
     actor.reset(seed)
     memory = SceneHistory(batch)

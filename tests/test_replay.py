@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 
 import uuv_marl.replay.encode
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.benchmark import runner
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import ReplayError, ResultsError
@@ -46,7 +46,7 @@ def rough(**changes):
 
 
 def run_of(scenario, policy, seed, watch=None):
-    events = evaluate(with_policy_requirements(policy, scenario), policy, [seed], watch)
+    events = episodes(with_policy_requirements(policy, scenario), policy, [seed], watch)
     return next(event for event in events if isinstance(event, Run))
 
 
@@ -83,7 +83,7 @@ def test_inspected_vehicles_show_what_the_engine_recorded():
     scenario = with_policy_requirements("bio_inspired", quick())
     recording = record(scenario, "bio_inspired", 5, inspect=[6, 2, 6])
     assert list(recording.inspections) == [6, 2]
-    swarm, policy = Swarm(scenario), make("bio_inspired", scenario)
+    swarm, policy = Swarm(scenario), make_policy("bio_inspired", scenario)
     percept = swarm.reset([5])
     policy.reset([5])
     for t in range(30):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make
+from uuv_marl.baselines import make_policy
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario.task import task_class
 
@@ -38,7 +38,7 @@ REACH = {"task": "reach"}
 
 
 def mean_return(name, scenario, reward, worlds):
-    batch, policy = BatchedEnv(scenario, worlds, reward), make(name, scenario, worlds)
+    batch, policy = BatchedEnv(scenario, worlds, reward), make_policy(name, scenario, worlds)
     batch.reset(0)
     policy.reset(0)
     total = np.zeros(worlds)
@@ -109,7 +109,7 @@ def test_who_moves_and_comes_back_gains_nothing(task, way):
 
 def left(batch):
     """What progress counts [m]."""
-    away = batch.task.remaining_m()[0] if hasattr(batch.task, "left") else batch.swarm.facts.away
+    away = batch.task.remaining_m()[0] if hasattr(batch.task, "remaining_m") else batch.swarm.facts.away
     return np.minimum(away, batch.swarm.scenario.reward.progress_far_m)
 
 
@@ -213,7 +213,7 @@ def test_terms_are_those_documented_and_sum_to_the_reward_whose_mean_the_team_ha
         _, rewards, *_, infos = env.step(action)
         assert list(team.step(action)[1].values()) == pytest.approx(len(rewards) * [np.mean(list(rewards.values()))])
         for agent, info in infos.items():
-            assert list(info["reward_terms"]) == list(task_class(task).terms)
+            assert list(info["reward_terms"]) == list(task_class(task).rewards["dense"])
             assert sum(info["reward_terms"].values()) == pytest.approx(rewards[agent], abs=1e-12)
 
 

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
-from uuv_marl.benchmark.evaluate import evaluate
+from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.robustness import job, page, scores
 from uuv_marl.benchmark.robustness.axes import AXES, BASE, CALM, GROUPS, overrides
 from uuv_marl.benchmark.success import GRACE_S
@@ -93,9 +93,9 @@ def test_a_cell_that_is_done_is_not_run_again(tmp_path, monkeypatch):
 
     def counted(scenario, policy, seeds, **parameters):
         asked.extend(seeds)
-        yield from evaluate(scenario, policy, seeds, **parameters)
+        yield from episodes(scenario, policy, seeds, **parameters)
 
-    monkeypatch.setattr("uuv_marl.benchmark.runner.evaluate", counted)
+    monkeypatch.setattr("uuv_marl.benchmark.runner.episodes", counted)
     first = job.run(tmp_path, TINY, silent).read_bytes()
     assert asked == [0, 0, 0]
     assert job.run(tmp_path, TINY, silent).read_bytes() == first

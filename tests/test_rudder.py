@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import PolicyError, make, with_policy_requirements
+from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.policy import Limits, Policy
 from uuv_marl.baselines.requirements import inner_loop_nms
 from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
@@ -82,7 +82,7 @@ def test_to_a_wished_velocity_a_rudder_turns_by_the_angle_whatever_the_hull_slip
 @pytest.mark.parametrize("name", ["lauv", "remus100"])
 def test_torpedoes_pass_an_obstacle_without_a_collision(name):
     scenario = with_policy_requirements("scout", with_vehicle(name, num_vehicles=12))
-    swarm, actor = Swarm(scenario), make("scout", scenario)
+    swarm, actor = Swarm(scenario), make_policy("scout", scenario)
     percept, collisions = swarm.reset(10_000), 0
     actor.reset(10_000)
     while not swarm.ended[0]:
@@ -102,13 +102,13 @@ class Acts(Policy):
 
 def test_bad_combinations_are_refused_with_the_remedy():
     with pytest.raises(PolicyError, match=r"'Acts' must define decide\(percept\), and leave act, .* alone"):
-        make("tests.test_rudder:Acts", LAUV)
+        make_policy("tests.test_rudder:Acts", LAUV)
     with pytest.raises(PolicyError, match=r"mappo was trained on another vehicle .* any_vehicle=True"):
-        make("mappo", with_policy_requirements("mappo", LAUV))
+        make_policy("mappo", with_policy_requirements("mappo", LAUV))
     rov = with_vehicle("bluerov2_heavy", speed=0.5)
     needed = re.escape(f"a yaw damping of {inner_loop_nms(600.0, 3000.0, rov):g} N m s")
     with pytest.raises(PolicyError, match=f"Scout needs {needed}"):
-        make("scout", rov)
+        make_policy("scout", rov)
 
 
 # --- Training ---

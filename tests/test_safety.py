@@ -4,17 +4,18 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import Policy, PolicyError, make, with_policy_requirements
+from uuv_marl.baselines import Policy, PolicyError, make_policy, with_policy_requirements
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.sim.swarm import Swarm
 
 
 class Ahead(Policy):
     """Full thrust, and nothing else."""
 
-    yaw_damping_nms = 600.0
+    requirements = PolicyRequirements(yaw_damping_nms=600.0)
 
     def decide(self, percept):
         action = np.zeros((*percept.flat.shape[:2], 2), np.float32)
@@ -31,7 +32,7 @@ def placed(overrides, poses, name, **parameters):
     """A swarm with its vehicles at (x, y, heading), and a policy for it."""
     scenario = load_scenario("single_obstacle", num_vehicles=len(poses), overrides=COURSE | overrides)
     scenario = with_policy_requirements(name, scenario)
-    swarm, policy = Swarm(scenario), make(name, scenario, **parameters)
+    swarm, policy = Swarm(scenario), make_policy(name, scenario, **parameters)
     swarm.reset(0)
     swarm.state.eta[0], swarm.state.nu[0] = np.array(poses), 0.0
     return swarm, policy, swarm.observe()
@@ -92,7 +93,7 @@ def test_who_backs_into_what_it_no_longer_hears_is_stopped():
 def test_where_nothing_is_near_no_action_changes(name):
     poses = [(0.0, 0.0, 0.3), (200.0, 250.0, -1.0), (-300.0, 100.0, 2.0)]
     swarm, bare, percept = placed({"obstacles": []}, poses, name)
-    guarded = make(f"{name},safety_filter=true", swarm.scenario)
+    guarded = make_policy(f"{name},safety_filter=true", swarm.scenario)
     for _ in range(round(10.0 / swarm.scenario.timing.decision_period_s)):
         action = bare.act(percept)
         np.testing.assert_array_equal(guarded.act(percept), action)
@@ -120,7 +121,7 @@ def test_policies_that_collide_alone_do_not_inside_the_filter(name):
     collisions = {}
     for policy in (name, f"{name},safety_filter=true"):
         scenario = with_policy_requirements(policy, load_scenario("random_field"))
-        runs = [run for run in evaluate(scenario, policy, [10_007]) if isinstance(run, Run)]
+        runs = [run for run in episodes(scenario, policy, [10_007]) if isinstance(run, Run)]
         collisions[policy] = sum(run.metrics["collisions"] for run in runs)
     assert collisions[name] > 0
     assert collisions[f"{name},safety_filter=true"] == 0
@@ -128,15 +129,15 @@ def test_policies_that_collide_alone_do_not_inside_the_filter(name):
 
 def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
     scenario = with_policy_requirements("bio_inspired,safety_filter=true", load_scenario("starter"))
-    policy = make("bio_inspired,zeta_n=0.5,safety_filter=true", scenario, barrier=Barrier(obstacle_m=9.0))
+    policy = make_policy("bio_inspired,zeta_n=0.5,safety_filter=true", scenario, barrier=Barrier(obstacle_m=9.0))
     assert policy.name == "bio_inspired,zeta_n=0.5,safety_filter=true"
     assert policy.inner.gains.zeta_n == 0.5
     assert policy.barrier.obstacle_m == 9.0
     with pytest.raises(PolicyError, match="barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"):
-        make("bio_inspired,barrier=5,safety_filter=true", scenario)
+        make_policy("bio_inspired,barrier=5,safety_filter=true", scenario)
     with pytest.raises(PolicyError, match="safety_filter must be true or false, got 'perhaps'"):
-        make("bio_inspired,safety_filter=perhaps", scenario)
-    guarded = make("sff,safety_filter=true", with_policy_requirements("sff,safety_filter=true", scenario))
+        make_policy("bio_inspired,safety_filter=perhaps", scenario)
+    guarded = make_policy("sff,safety_filter=true", with_policy_requirements("sff,safety_filter=true", scenario))
     with pytest.raises(PolicyError, match=r"the snapshot's identity must be"):
         guarded.restore(guarded.snapshot() | {"inner.identity": np.zeros(3)})
 
@@ -146,6 +147,6 @@ def test_scout_arrives_and_touches_nothing(echoes):
     scenario = with_policy_requirements(
         "scout", load_scenario("random_field", overrides={"sonar.echo_reports": echoes})
     )
-    runs = [run for run in evaluate(scenario, "scout", [10_007, 10_008]) if isinstance(run, Run)]
+    runs = [run for run in episodes(scenario, "scout", [10_007, 10_008]) if isinstance(run, Run)]
     assert all(run.metrics["collisions"] == 0 for run in runs)
     assert all(run.metrics["task_time_s"] is not None for run in runs)

@@ -17,7 +17,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
 from uuv_marl import load_scenario, parallel_env
-from uuv_marl.baselines import PolicyError, make, with_policy_requirements
+from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
 from uuv_marl.envs.sb3 import SwarmVecEnv
 from uuv_marl.train import run
 from uuv_marl.train.sb3 import save_sb3
@@ -155,7 +155,7 @@ def test_a_checkpoint_acts_as_the_model_does(tmp_path):
     env = actors()
     model = learn(VecNormalize(env, norm_obs=False))
     save_sb3(model, tmp_path / "policy.safetensors")
-    policy, observation = make(str(tmp_path), env.scenario, 2), env.reset()
+    policy, observation = make_policy(str(tmp_path), env.scenario, 2), env.reset()
     for _ in range(20):
         output = model.predict(observation, deterministic=True)[0]
         within = output / np.maximum(1.0, np.linalg.norm(output, axis=1, keepdims=True))
@@ -194,7 +194,7 @@ def test_the_example_trains_a_policy(tmp_path):
     assert f"--scenario starter --policy {tmp_path}" in done.stdout
     assert PPO.load(tmp_path / "model").num_timesteps > 100
     scenario = with_policy_requirements(str(tmp_path), load_scenario("starter"))
-    assert make(str(tmp_path), scenario).yaw_damping_nms == 600.0
+    assert make_policy(str(tmp_path), scenario).requirements.yaw_damping_nms == 600.0
 
 
 def test_a_reset_or_a_refusal_leaves_no_action_behind():

@@ -6,7 +6,7 @@ import pytest
 
 from research.second import SECOND, runnable
 from uuv_marl import load_scenario
-from uuv_marl.baselines import POLICIES, make, with_policy_requirements
+from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.scenario import scenario_names
@@ -24,7 +24,7 @@ def test_it_is_end_to_end_and_runs_where_its_task_is(name):
     rows = observation_layout(load_scenario(card.training.get("scenario", "training_field")), "closeness").table
     for scenario in map(load_scenario, scenario_names()):
         if observation_layout(scenario, "closeness").table == rows:
-            make(runnable(name), with_policy_requirements(runnable(name), scenario))
+            make_policy(runnable(name), with_policy_requirements(runnable(name), scenario))
 
 
 @pytest.mark.parametrize("name", [name for name in NETWORKS if name.startswith("mappo")])

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import PolicyError, ScenarioError
 from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks import SilentTargets
+from uuv_marl.tasks.silent_targets import SilentTargets
 
 TIERS = ("silent_targets_easy", "silent_targets", "silent_targets_hard")
 TUNING = 10_100
@@ -44,8 +44,8 @@ def test_targets_depend_on_their_seed_alone_and_not_on_what_vehicles_do():
         single.reset(TUNING + w)
         for _ in range(60):
             single.step(0.3 * rng.uniform(-1.0, 1.0, (1, single.num_vehicles, 2)))
-        np.testing.assert_array_equal(single.course.obstacles[0], batch.course.obstacles[w])
-    assert len(np.unique(batch.course.obstacles[:, :, 0])) == 24
+        np.testing.assert_array_equal(single.world_map.obstacles[0], batch.world_map.obstacles[w])
+    assert len(np.unique(batch.world_map.obstacles[:, :, 0])) == 24
 
 
 @pytest.mark.parametrize("tier", TIERS)
@@ -144,14 +144,14 @@ def test_progress_and_pay_count_targets_that_no_nearer_vehicle_holds():
     swarm.world_map.obstacles[0, :2, :2] = (0.0, 0.0), (200.0, 0.0)
     swarm.state.eta[0, 0, :2], swarm.state.eta[0, 1, :2] = (0.0, 10.0), (0.0, 50.0)
     swarm.observe()
-    left = swarm.task._left()[0]
+    left = swarm.task._remaining_m()[0]
     assert left[0] == pytest.approx(10.0)  # its own
     assert left[1] == pytest.approx(np.hypot(200.0, 50.0))
     swarm.state.eta[0, 2, :2] = (200.0, 5.0)
-    assert swarm.task._left()[0, 1] == 0.0  # none is left
+    assert swarm.task._remaining_m()[0, 1] == 0.0  # none is left
     swarm.state.eta[0, 1, :2] = 0.0, -20.0  # a second one at the first target changes nothing for who is nearer
     swarm.state.eta[0, 2, :2] = 300.0, 500.0
-    left, held = swarm.task._left()[0], swarm.task.reward(np.ones(1, np.bool_))["held"][0]
+    left, held = swarm.task._remaining_m()[0], swarm.task.reward(np.ones(1, np.bool_))["held"][0]
     assert left[:2] == pytest.approx([10.0, np.hypot(200.0, 20.0)])
     assert held[0] > 0.0
     assert not held[1:].any()
@@ -172,14 +172,14 @@ def test_a_run_goes_on_alike_from_a_snapshot():
 
 def shares(name, tier, worlds=4):
     scenario = with_policy_requirements(name, load_scenario(tier))
-    batch, policy = BatchedEnv(scenario, worlds), make(name, scenario, worlds)
+    batch, policy = BatchedEnv(scenario, worlds), make_policy(name, scenario, worlds)
     batch.reset(TUNING)
     policy.reset(TUNING)
     total = np.zeros(worlds)
     while not batch.over.all():
         policy.active[:] = ~batch.over
         result = batch.step(policy.act(batch.swarm.percept))
-        assert list(result.terms) == list(SilentTargets.terms)
+        assert list(result.terms) == list(SilentTargets.rewards["dense"])
         total += result.world_reward
     return np.mean([batch.task.metrics(w)["held_share"] for w in range(worlds)]), total.mean()
 
@@ -194,7 +194,7 @@ def test_the_oracle_holds_all_and_the_guide_beats_the_floors():
 
 def way_of(policy, decisions=300):
     swarm = water(2, "silent_targets_easy")
-    policy, percept = make(policy, swarm.scenario, 2), swarm.reset(TUNING)
+    policy, percept = make_policy(policy, swarm.scenario, 2), swarm.reset(TUNING)
     policy.reset(TUNING)
     for _ in range(decisions):
         percept = swarm.step(policy.act(percept))
@@ -202,14 +202,14 @@ def way_of(policy, decisions=300):
 
 
 def test_every_gain_of_the_search_can_be_given_by_name_and_counts():
-    gains, usual = make("nearest_target", load_scenario("silent_targets_easy")).gains, way_of("nearest_target")
+    gains, usual = make_policy("nearest_target", load_scenario("silent_targets_easy")).gains, way_of("nearest_target")
     for name, value in gains._asdict().items():
         assert not np.array_equal(way_of(f"nearest_target,{name}={0.1 * value}"), usual), name
 
 
 def test_the_search_refuses_what_has_no_box():
     with pytest.raises(PolicyError, match="searches a box, of which task 'follow' tells nothing; run it on silent"):
-        make("nearest_target", with_policy_requirements("nearest_target", load_scenario("starter")))
+        make_policy("nearest_target", with_policy_requirements("nearest_target", load_scenario("starter")))
 
 
 @pytest.mark.parametrize(("changes", "message"), [

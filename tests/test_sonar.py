@@ -1,4 +1,4 @@
-"""Laws of the sonar suite (Eq. 8-17): its edges and its symmetries. Brute force is in test_oracle.py."""
+"""Properties of the sonar suite (Eq. 8-17): its edges and its symmetries. Brute force is in test_oracle.py."""
 
 import math
 
@@ -17,7 +17,7 @@ BASE = load_scenario("tracking")
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(0.5, 99.0))
-def test_arrays_that_tile_the_circle_hear_every_direction_once(bearing, distance):
+def test_arrays_that_tile_the_circle_cover_every_direction_once(bearing, distance):
     sectors = suite(BASE)
     b = distance * math.cos(bearing), distance * math.sin(bearing)
     low = sectors.lower[:, 0] * b[1] - sectors.lower[:, 1] * b[0] > 0.0

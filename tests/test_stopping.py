@@ -1,4 +1,4 @@
-"""Contacts that hurt: laws of a hull that has run into something."""
+"""Collisions that stop: properties of a hull that has hit something."""
 
 import numpy as np
 import pytest
@@ -24,14 +24,14 @@ def two(first, second, *, nu=((0.0, 0.0, 0.0),) * 2, **changes):
 
 
 def energy(swarm):
-    """Kinetic energy through the water [J]."""
+    """Kinetic energy relative to the water [J]."""
     m_11, m_22, m_23, m_33 = swarm.scenario.vehicle.inertia
     u, v, r = np.moveaxis(swarm.state.nu[0], -1, 0)
     return 0.5 * float((m_11 * u * u + m_22 * v * v + 2 * m_23 * v * r + m_33 * r * r).sum())
 
 
-def test_a_hull_that_pushes_on_stands_at_the_wall_and_touches_it_once():
-    """Full thrust at a wall for 10 s: no further than a millimetre in, and one contact episode."""
+def test_a_hull_that_pushes_on_stays_at_the_wall_in_one_collision():
+    """Full thrust at a wall for 10 s: no further than a millimetre in, and one collision."""
     swarm = two((-30.0, 0.0, 0.0), (300.0, 0.0, 0.0))
     contacts = 0
     for _ in range(100):
@@ -47,7 +47,7 @@ def test_a_hull_that_pushes_on_stands_at_the_wall_and_touches_it_once():
 
 
 def test_along_a_wall_a_hull_glides():
-    """The impulse has no component along the surface: that velocity stays, but for drag."""
+    """The impulse has no component along the surface: only drag changes that velocity."""
     swarm = two((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     free = two(
         (-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)), **{"collision.stops": False}
@@ -64,7 +64,7 @@ speeds = st.tuples(st.floats(-5.0, 5.0), st.floats(-3.0, 3.0), st.floats(-1.0, 1
 
 
 def momentum(swarm):
-    """Of all vehicles through still water, north and east [N s]."""
+    """Momentum of all vehicles in still water, north and east [N s]."""
     m_11, m_22, *_ = swarm.scenario.vehicle.inertia
     (u, v, _), psi = np.moveaxis(swarm.state.nu[0], -1, 0), swarm.state.eta[0, :, 2]
     c, s = np.cos(psi), np.sin(psi)
@@ -74,7 +74,7 @@ def momentum(swarm):
 @settings(max_examples=40, deadline=None)
 @given(pose=poses, first=speeds, second=speeds, x_g=st.sampled_from([0.0, 0.1]))
 def test_energy_never_rises_and_two_hulls_keep_their_momentum(pose, first, second, x_g):
-    """Beside the same hulls that pass through each other: what differs after a hold is the impulse alone."""
+    """Against the same hulls without collisions: after a control step only the impulse differs."""
     start = (300.0 + pose[0], pose[1], pose[2]), (300.0, 0.0, 0.0)
     on, off = (
         two(*start, nu=(first, second), **{"vehicle.x_G_m": x_g, "collision.stops": stops}) for stops in (True, False)
@@ -88,7 +88,7 @@ def test_energy_never_rises_and_two_hulls_keep_their_momentum(pose, first, secon
 
 
 def test_hulls_of_other_masses_than_the_nominal_one_keep_their_momentum_too():
-    """Masses are drawn (mismatch); beside the same hulls that pass through each other, as above."""
+    """Masses are random (mismatch); against the same hulls without collisions, as above."""
     start, nu = ((300.0, 0.0, 0.0), (302.02, 0.0, 0.0)), ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     drawn = {"mismatch.mass": 0.8, "mismatch.added_mass": 0.8, "timing.integration_step_s": 0.00625}
     on, off = (two(*start, nu=nu, **drawn, **{"collision.stops": stops}) for stops in (True, False))
@@ -112,7 +112,7 @@ def test_two_hulls_head_on_share_their_momentum():
     assert swarm.facts.vehicle_collisions[0].tolist() == [1, 1]
 
 
-def test_a_disc_that_drifts_carries_a_hull_along():
+def test_a_drifting_disc_carries_a_hull_along():
     swarm = two((22.0, 0.0, 0.0), (300.0, 0.0, 0.0))
     swarm.world_map.obstacle_velocity[0, 0] = (2.0, 0.0)
     for _ in range(50):

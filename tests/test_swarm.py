@@ -1,4 +1,4 @@
-"""Swarm: seeds, batches, endings, losses, contacts, and the random fields."""
+"""Swarm: seeds, batches, endings, losses, collisions, and random fields."""
 
 import math
 import multiprocessing
@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import label
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.sim import engine as engine_module
 from uuv_marl.sim.field import sample_field
 from uuv_marl.sim.swarm import Swarm
@@ -24,7 +24,7 @@ from uuv_marl.sim.threads import on_threads
 def play(scenario, seeds, steps, policy="bio_inspired"):
     """Final states and percepts, world by world, of a few steps in one batch."""
     scenario = with_policy_requirements(policy, scenario)
-    swarm, actor = Swarm(scenario, len(seeds)), make(policy, scenario, len(seeds))
+    swarm, actor = Swarm(scenario, len(seeds)), make_policy(policy, scenario, len(seeds))
     percept = swarm.reset(list(seeds))
     actor.reset(list(seeds))
     for _ in range(steps):
@@ -55,7 +55,7 @@ def test_threads_do_not_change_a_run(monkeypatch):
 
 @pytest.mark.parametrize("layer", ["omp", "workqueue"])
 def test_several_threads_step_batches_at_once(layer):
-    """Numba's own threads would end the process here, with the layer that it takes where OpenMP is missing."""
+    """Numba's own threads would abort the process here, with its threading layer without OpenMP."""
     environment = {**os.environ, "NUMBA_THREADING_LAYER": layer, "NUMBA_NUM_THREADS": "2"}
     done = subprocess.run([sys.executable, "-c", AT_ONCE], capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, done.stdout.strip()) == (0, "True"), done.stderr
@@ -119,12 +119,12 @@ print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
 """
 
 
-def test_after_a_fork_a_batch_goes_on_with_threads_of_its_own():
+def test_after_a_fork_a_batch_runs_with_threads_of_its_own():
     done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "7", done.stderr
 
 
-def test_inactive_worlds_stand_still():
+def test_inactive_worlds_stay_unchanged():
     swarm = Swarm(load_scenario("tracking", num_vehicles=4), 2)
     swarm.reset(0)
     before = swarm.state.eta.copy()
@@ -136,7 +136,7 @@ def test_inactive_worlds_stand_still():
 
 @pytest.mark.parametrize(("n", "spacing"), [(1, 13.0), (2, 13.0), (5, 13.0), (54, 17.0), (55, 13.0), (200, 13.0)])
 def test_the_start_is_two_groups_behind_the_first_point_at_the_spacing(n, spacing):
-    """At 17 m random placement jams."""
+    """At 17 m random placement finds no room, and the lattice is used."""
     scenario = load_scenario("single_obstacle", num_vehicles=n, overrides={"start.spacing_m": spacing})
     swarm = Swarm(scenario, 3)
     swarm.reset(0)
@@ -211,7 +211,7 @@ SPREAD = np.array([[-3.0, -3.0], [3.0, -3.0], [-3.0, 3.0], [3.0, 3.0]])
     ],
 )
 def test_a_swarm_arrives_as_its_centre_crosses_the_line_through_the_end_together(centre, scattered, time_s, arrives):
-    """And l(t) has: its way of 160 m takes 40 s."""
+    """And l(t) has: its path of 160 m takes 40 s."""
     swarm = Swarm(passing())
     swarm.reset(0)
     swarm.state.eta[0, :, :2], swarm.state.tick[:] = np.array(centre) + scattered * SPREAD, round(10.0 * time_s)
@@ -220,7 +220,7 @@ def test_a_swarm_arrives_as_its_centre_crosses_the_line_through_the_end_together
     assert not arrives or swarm.facts.arrival_s[0, 0] == swarm.facts.time_s[0], "at that moment"
 
 
-def test_lost_vehicles_fall_silent_and_leave_the_centre():
+def test_lost_vehicles_are_not_detected_and_leave_the_centre():
     scenario = load_scenario("lossy", overrides={"losses.times_s": [0.0, 0.25, 1.0]})
     swarm = Swarm(scenario)
     swarm.reset(5)
@@ -270,8 +270,8 @@ def test_random_fields_are_feasible(seed, n):
     assert regions[cells[0]] == regions[cells[1]] != 0
 
 
-def test_an_obstacle_that_moves_onto_a_vehicle_is_a_contact():
-    """Contact is judged from the motion of both; who only lies there, or moves within a contact, begins no other."""
+def test_an_obstacle_that_moves_onto_a_vehicle_is_a_collision():
+    """The motion of both counts; resting or moving within a collision begins no other."""
     scenario = load_scenario("single_obstacle", num_vehicles=2)
     swarm, still = Swarm(scenario), np.zeros((1, 2, 2), np.float32)
     swarm.reset(0)
@@ -289,7 +289,7 @@ def test_an_obstacle_that_moves_onto_a_vehicle_is_a_contact():
     assert swarm.facts.vehicle_collisions[0, 0] == 1, "an obstacle that appears on a vehicle"
 
 
-def test_a_swarm_that_has_run_can_be_pickled_and_goes_on_alike():
+def test_a_swarm_that_has_run_can_be_pickled_and_continues_alike():
     swarm, action = Swarm(load_scenario("starter"), 2), np.full((2, 5, 2), 0.5, np.float32)
     swarm.reset(0)
     swarm.step(action)

@@ -1,4 +1,4 @@
-"""Arrays are declared once; memory, documentation and checks follow, whatever the scenario."""
+"""Arrays are declared once; memory, documentation and checks are made from that, for every scenario."""
 
 import itertools
 from typing import Annotated, Any, NamedTuple, TypeVar
@@ -9,11 +9,13 @@ from typing_extensions import TypeAliasType
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
+from uuv_marl.percept import CHANNELS
+from uuv_marl.scenario.hardware import CHANNEL_NAMES
 from uuv_marl.sim import entry_points
 from uuv_marl.sim.arrays import Facts, Senses, State, WorldMap
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import Bounds, allocate, array_specs, check
-from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, named, workspace, workspace_buffers
+from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, obstacle_columns, workspace, workspace_buffers
 from uuv_marl.types import Float32
 
 RUDDER = {"vehicle.Y_uv": -60.0, "vehicle.N_ur": -10.0, "vehicle.munk_moment": False, "actuators.kind": "rudder",
@@ -24,26 +26,26 @@ LENGTHS = {"vehicle": 8, "sector": 22, "cell": 5, "obstacle": 4, "nearby": 7 * M
 
 
 @pytest.fixture
-def desks():
-    room = workspace_buffers(threads=2, num_vehicles=7, num_sectors=21, num_cells=4, num_obstacles=3)
-    own = [workspace.py_func(room, t) for t in range(2)]
-    return room, [(*desk[:-1], named.py_func(desk.obstacles)) for desk in own]
+def workspaces():
+    buffers = workspace_buffers(threads=2, num_vehicles=7, num_sectors=21, num_cells=4, num_obstacles=3)
+    own = [workspace.py_func(buffers, t) for t in range(2)]
+    return buffers, [(*each[:-1], obstacle_columns.py_func(each.obstacles)) for each in own]
 
 
-def test_every_array_of_a_desk_has_room_of_its_own(desks):
-    arrays = [array for own in desks[1] for table in own for array in table]
+def test_arrays_of_workspaces_share_no_memory(workspaces):
+    arrays = [array for own in workspaces[1] for table in own for array in table]
     assert len(arrays) == 2 * sum(len(table._fields) for table in TABLES)
     for a, b in itertools.combinations(arrays, 2):
         assert not np.shares_memory(a, b)
 
 
-def test_a_desk_leaves_no_column_unused_and_has_the_declared_types(desks):
-    room, own = desks
+def test_a_workspace_uses_every_column_and_has_the_declared_types(workspaces):
+    buffers, own = workspaces
     for table, arrays in zip(TABLES, Workspace(*own[0]), strict=True):
         for (name, spec), array in zip(array_specs(table).items(), arrays, strict=True):
             assert array.dtype == spec.dtype, name
             assert len(array) >= LENGTHS[spec.axes[0]], name
-    columns = sum(block.shape[1] for block in room)
+    columns = sum(block.shape[1] for block in buffers)
     assert columns == sum(len(table._fields) for table in TABLES)
 
 
@@ -58,12 +60,16 @@ def test_an_array_may_be_declared_by_any_alias_of_its_type():
         assert array_specs(Heights)["height"].dtype is np.float32
 
 
-def test_a_table_tells_shapes_types_and_meaning():
+def test_a_table_documents_shapes_types_and_meaning():
     state = allocate(State, SIZES)
     assert (state.eta.shape, state.eta.dtype, state.alive.dtype) == ((2, 5, 3), np.float64, np.bool_)
     assert "eta: Pose: north [m], east [m], heading [rad]. Shape (world, vehicle, 3), float64." in State.__doc__
     for table in (State, WorldMap, Senses, Facts):
         assert all(f"\n        {name}: " in table.__doc__ for name in table._fields)
+
+
+def test_a_scenario_accepts_the_channels_that_add_fields():
+    assert CHANNELS == CHANNEL_NAMES
 
 
 @pytest.mark.parametrize(
@@ -83,7 +89,7 @@ def test_numbers_that_compiled_code_takes_unchecked_have_bounds(low, axis, beyon
 
 
 def test_the_compiled_types_are_the_same_for_all_scenarios():
-    """Otherwise each scenario, hull or disturbance compiles the whole simulation anew."""
+    """Otherwise each scenario, hull or disturbance compiles the whole simulation again."""
     changes = [
         (STARTER, {}),
         ("tracking", {"num_vehicles": 1}),
@@ -103,4 +109,4 @@ def test_the_compiled_types_are_the_same_for_all_scenarios():
             swarm.reset(0)
             swarm.step(np.zeros((worlds, swarm.num_vehicles, 2)))
     for function in (entry_points.observe, entry_points.step_worlds):
-        assert len(function.signatures) == 2, "one without a sea, one with"
+        assert len(function.signatures) == 2, "one without disturbances, one with them"

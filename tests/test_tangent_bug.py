@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.bug.walls import SAME_M
 from uuv_marl.sim.swarm import Swarm
@@ -29,7 +29,7 @@ def water(walls, surface=False, side=1.0):
 def fly(name, scenario, side=1.0, steps=300, **parameters):
     """The swarm, the policy, and places [m], shape (decision, 2), until the vehicle is there."""
     scenario = with_policy_requirements(name, scenario)
-    swarm, policy = Swarm(scenario), make(name, scenario, **parameters)
+    swarm, policy = Swarm(scenario), make_policy(name, scenario, **parameters)
     swarm.reset(10_000)
     swarm.state.eta[0, 0], swarm.state.nu[0, 0] = (5.0, 4.0 * side, 0.0), 0.0
     policy.reset(0)

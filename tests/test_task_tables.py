@@ -10,10 +10,10 @@ from research.episodes import read_rows
 from research.tasks.page import report
 from research.tasks.studies import STUDIES, set_name
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.percept import Percept
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.maps import KINDS
+from uuv_marl.tasks.maps.kinds import KINDS
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 STUDY = STUDIES["hard_water"]
@@ -52,7 +52,7 @@ def test_the_page_by_hand():
 
 def test_a_blind_policy_hears_no_echo_and_all_else():
     scenario = with_policy_requirements("mappo", load_scenario("hard_water", num_vehicles=4))
-    swarm, blind, sighted = Swarm(scenario, 2), Blind(scenario, 2, inner="mappo"), make("mappo", scenario, 2)
+    swarm, blind, sighted = Swarm(scenario, 2), Blind(scenario, 2, inner="mappo"), make_policy("mappo", scenario, 2)
     percept = swarm.reset(10_100)
     for policy in (blind, sighted):
         policy.reset(10_100)

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.benchmark.figures import _outcome
 from uuv_marl.benchmark.frame import load
 from uuv_marl.cli import app
@@ -23,7 +23,7 @@ from uuv_marl.errors import RewardError, ScenarioError
 from uuv_marl.percept import FLAG, PerceptField
 from uuv_marl.sim.episode_setup import default_setup
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks import Task
+from uuv_marl.tasks import Follow, Task
 from uuv_marl.tasks.measures import MEASURED
 
 EXAMPLE = "examples.extending.task:Rendezvous"
@@ -34,7 +34,7 @@ import hashlib, uuv_marl
 for name in ("few_informed", "hard_water", "two_swarms", "silent_targets", "random_field"):
     swarm = uuv_marl.vector_env(4, name).swarm
     swarm.reset(0)
-    print(name, hashlib.sha256(swarm.course.obstacles.tobytes() + swarm.state.eta.tobytes()).hexdigest())
+    print(name, hashlib.sha256(swarm.world_map.obstacles.tobytes() + swarm.state.eta.tobytes()).hexdigest())
 """
 
 
@@ -61,10 +61,19 @@ def test_a_goal_at_rest_is_at_rest_where_others_pass_by():
 
 
 class Survive(Task):
-    """All are where they should be."""
+    """The scenario's own start; every vehicle is at its goal, nothing is rewarded, and the time limit ends an episode."""
 
-    def there(self):
+    def draw(self, world, rng):
+        return super().draw(world, rng)
+
+    def at_goal(self):
         return np.ones_like(self.swarm.state.alive)
+
+    def done(self):
+        return np.zeros(self.swarm.num_worlds, np.bool_)
+
+    def reward(self, running):
+        return {}
 
 
 class TwoWays(Survive):
@@ -96,9 +105,9 @@ class Endless(Survive):
 
 
 class Broken(Survive):
-    """Pays what it does not declare."""
+    """Gives a term that it does not declare."""
 
-    terms = {"one": "1"}  # noqa: RUF012
+    rewards = {"dense": {"one": "1"}}  # noqa: RUF012
 
     def reward(self, running):
         return {"two": np.zeros((1, 5))}
@@ -193,7 +202,7 @@ def test_a_task_that_is_named_takes_fields_too():
     ("nowhere:Task", "task 'nowhere:Task' can't be imported: No module named 'nowhere'"),
     ("json:dumps", "task 'json:dumps' must be a subclass of uuv_marl.tasks.Task"),
     ({"name": "reach", "near_m": -3.0}, "task.near_m must lie within 0.001 to 1,000,000, got -3.0"),
-    ({"name": "reach", "far_m": 3.0}, "task.far_m is unknown; the numbers of task 'reach' are near_m"),
+    ({"name": "reach", "far_m": 3.0}, "task.far_m is unknown; .*near_m"),
     ({"near_m": 3.0}, "task.name is missing"),
     (7, "task must be"),
 ])  # fmt: skip
@@ -206,29 +215,23 @@ NEAR = PerceptField("near", (1,), FLAG, "1 within 10 m")
 
 
 @pytest.mark.parametrize(("base", "own", "message"), [
-    (Task, {}, "must define there(), the vehicles that are where they should be"),
+    (Task, {}, "must define at_goal, done, draw, reward; see uuv_marl.tasks.task.RequiredMethods"),
     (Survive, {"columns": {"collisions": "", "mine_m": ""}}, "can't have collisions in columns: the name is taken"),
     (Survive, {"columns": {"constraint_share_all": ""}}, "can't have constraint_share_all in columns"),
-    (Survive, {"observed": (NEAR._replace(name="detected"),)}, "can't have heard in observed or channels"),
+    (Survive, {"observed": (NEAR._replace(name="detected"),)}, "can't have detected in observed or channels"),
     (Survive, {"observed": (NEAR,), "channels": {"sight": (NEAR,)}}, "can't have near in observed or channels"),
     (Survive, {"channels": {"compass": (NEAR,)}}, "can't have compass in channels"),
-    (Survive, {"rewards": ("dense", "team")}, "can't have team in rewards"),
+    (Survive, {"rewards": {"dense": {}, "team": {}}}, "can't have team in rewards"),
 ])  # fmt: skip
-def test_a_task_that_says_nothing_of_success_or_takes_a_name_twice_is_refused_by_it(monkeypatch, base, own, message):
+def test_a_task_that_lacks_a_method_or_takes_a_name_twice_is_refused_by_it(monkeypatch, base, own, message):
     monkeypatch.setattr(sys.modules[__name__], "Unfit", type("Unfit", (base,), own), raising=False)
     with pytest.raises(ScenarioError, match=re.escape(f"task Unfit {message}")):
         load_scenario("starter", overrides={"task": f"{__name__}:Unfit"})
 
 
-def test_a_task_may_say_who_succeeds_without_saying_where(monkeypatch):
-    own = {"succeeded": lambda task: task.swarm.state.alive.copy()}
-    monkeypatch.setattr(sys.modules[__name__], "Fit", type("Fit", (Task,), own), raising=False)
-    assert load_scenario("starter", overrides={"task": f"{__name__}:Fit"}).task_class.headline == "success_share"
-
-
 @pytest.mark.parametrize(("own", "more", "message"), [
     ({"min_spacing_m": 1.0, "success_share": 1.0, "swarm_success": 1.0}, {}, "can't give min_spacing_m in metrics: the name"),
-    ({"mine_m": 1.0}, {}, "must give success_share, whole in metrics; add to super"),
+    ({"mine_m": 1.0}, {}, "must give success_share, swarm_success in metrics; add to super"),
     ({"success_share": 1.0, "swarm_success": 1.0}, {"headline": "mine_share"}, "must give mine_share in metrics"),
 ])  # fmt: skip
 def test_metrics_that_would_be_hidden_or_missed_are_refused_at_the_first_episodes_end(monkeypatch, own, more, message):
@@ -236,11 +239,11 @@ def test_metrics_that_would_be_hidden_or_missed_are_refused_at_the_first_episode
     monkeypatch.setattr(sys.modules[__name__], "Wrong", wrong, raising=False)
     scenario = load_scenario("starter", overrides={"task": f"{__name__}:Wrong", **BRIEF})
     with pytest.raises(ScenarioError, match=f"task Wrong {message}"):
-        list(evaluate(scenario, "idle", [0]))
+        list(episodes(scenario, "idle", [0]))
 
 
 def test_numbers_that_a_task_needs_are_missed_when_a_swarm_is_made():
-    with pytest.raises(ScenarioError, match="task.kinds is missing; a task by name takes it as in"):
+    with pytest.raises(ScenarioError, match="task.kinds is missing; give it a value"):
         uuv_marl.parallel_env("starter", task="hard_water")
 
 
@@ -251,6 +254,26 @@ def test_a_reward_that_a_task_does_not_know_or_does_not_give_is_refused():
     env.reset(seed=0)
     with pytest.raises(RewardError, match="reward of Broken must give the terms one, got two"):
         env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
+
+
+class Still(Follow):
+    """A reward of its own in place of the compiled one."""
+
+    rewards = {"dense": {"still": "-1 m/s", "tracking": "as in follow"}}  # noqa: RUF012
+
+    def reward(self, running):
+        slow = -np.hypot(*np.moveaxis(self.swarm.velocity, -1, 0))
+        return {"still": slow, "tracking": super().reward(running)["tracking"]}
+
+
+def test_a_subclass_of_follow_may_have_its_own_reward():
+    batch, usual = (BatchedEnv(load_scenario("starter", overrides=own)) for own in ({"task": f"{__name__}:Still"}, {}))
+    for env in (batch, usual):
+        env.reset(0)
+    result, expected = (env.step(np.ones((1, 5, 2))) for env in (batch, usual))
+    np.testing.assert_array_equal(result.terms["tracking"], expected.terms["tracking"])
+    np.testing.assert_array_equal(result.reward, sum(result.terms.values()))
+    assert (result.terms["still"] < 0.0).all()
 
 
 def test_a_task_may_draw_no_longer_way_than_it_says():
@@ -266,7 +289,7 @@ def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():
         assert (mine.timing.decision_period_s, mine.actuators.yaw_damping_nms) == (0.5, 600.0)
     own = with_policy_requirements("bio_inspired,own_clock=true", scenario)
     assert (own.timing.decision_period_s, own.actuators.yaw_damping_nms) == (0.1, 0.0)
-    (run,) = [event for event in evaluate(own, "bio_inspired,own_clock=true", [0]) if isinstance(event, Run)]
+    (run,) = [event for event in episodes(own, "bio_inspired,own_clock=true", [0]) if isinstance(event, Run)]
     assert run.metrics["task_time_s"] is not None
 
 
@@ -348,5 +371,5 @@ def test_a_users_task_is_trained_and_the_policy_runs(tmp_path):
     assert np.isfinite(rewards).all()
     policy = str(tmp_path / "a" / "best")
     scenario = with_policy_requirements(policy, load_scenario("starter", overrides={"task": EXAMPLE}))
-    (run,) = [event for event in evaluate(scenario, policy, [0]) if isinstance(event, Run)]
+    (run,) = [event for event in episodes(scenario, policy, [0]) if isinstance(event, Run)]
     assert run.metrics["task"]["spread_m"] > 0.0

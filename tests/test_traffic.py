@@ -1,4 +1,4 @@
-"""Obstacles that move: how they do, what vehicles hear and touch of them, runs by seed, and how they are shown."""
+"""Moving obstacles: motion, echoes, collisions, seeds, and replays."""
 
 import json
 import math
@@ -40,7 +40,7 @@ def go(made, steps=1):
 
 
 def discs(made, w=0):
-    return made.course.obstacles[w, : made.course.num_obstacles[w]].copy()
+    return made.world_map.obstacles[w, : made.world_map.num_obstacles[w]].copy()
 
 
 # How they move
@@ -48,13 +48,13 @@ def discs(made, w=0):
 
 @settings(max_examples=15)
 @given(speed=st.floats(1.0, 20.0), way=st.floats(2.0, 12.0), seed=st.integers(0, 999))
-def test_an_obstacle_goes_to_and_fro_at_its_speed_and_never_farther_than_its_way(speed, way, seed):
+def test_an_obstacle_oscillates_at_its_speed_within_its_amplitude(speed, way, seed):
     made = swarm("random_field", speed, way, seed=seed)
     places, velocity = [discs(made)], []
     for _ in range(round(4.0 * way / speed / HOLD_S) + 5):
         go(made)
         places.append(discs(made))
-        velocity.append(made.course.obstacle_velocity[0, : len(places[0])].copy())
+        velocity.append(made.world_map.obstacle_velocity[0, : len(places[0])].copy())
     away = np.array(places)[:, :, :2] - places[0][:, :2]
     np.testing.assert_allclose(np.linalg.norm(velocity, axis=2), speed, rtol=1e-12)
     np.testing.assert_allclose(np.diff(away, axis=0), HOLD_S * np.array(velocity), atol=1e-9)
@@ -68,13 +68,13 @@ def test_an_obstacle_goes_to_and_fro_at_its_speed_and_never_farther_than_its_way
     assert (away[[2 * holds, 4 * holds]] == 0.0).all()
 
 
-def test_so_slow_an_obstacle_never_turns():
+def test_a_very_slow_obstacle_never_turns():
     made = swarm(speed_mps=1e-300)
     go(made, 3)
-    assert made.course.swing_control_steps[0, 0] > 10**6
+    assert made.world_map.swing_control_steps[0, 0] > 10**6
 
 
-def test_the_share_moves_rounded_up_and_a_larger_one_the_same_and_more():
+def test_the_share_is_rounded_up_and_a_larger_one_moves_the_same_and_more():
     seen = []
     for share in (0.0, 0.3, 0.5, 1.0):
         made = swarm("multi_obstacle", share=share)
@@ -86,23 +86,23 @@ def test_the_share_moves_rounded_up_and_a_larger_one_the_same_and_more():
         seen.append(moved)
 
 
-def test_which_move_and_where_to_is_the_seed_s():
-    pairs = [swarm("multi_obstacle", share=0.5, seed=seed).course.swing[0, :, 2:] for seed in (0, 0, 1)]
+def test_the_seed_decides_which_move_and_where():
+    pairs = [swarm("multi_obstacle", share=0.5, seed=seed).world_map.swing[0, :, 2:] for seed in (0, 0, 1)]
     np.testing.assert_array_equal(pairs[0], pairs[1])
     assert (pairs[0] != pairs[2]).any()
     movers = {
-        tuple(swarm("multi_obstacle", share=0.5, seed=seed).course.swing_control_steps[0] > 0) for seed in range(8)
+        tuple(swarm("multi_obstacle", share=0.5, seed=seed).world_map.swing_control_steps[0] > 0) for seed in range(8)
     }
     assert len(movers) > 2
 
 
 @pytest.mark.parametrize("name", ["random_field", "lossy"])
-def test_nothing_else_is_drawn_anew(name):
+def test_all_other_random_numbers_stay(name):
     still, moving = (swarm(name, speed, **{"swarm.num_vehicles": 9}) for speed in (0.0, 3.0))
     for table in ("eta", "nu"):
         np.testing.assert_array_equal(getattr(still.state, table), getattr(moving.state, table))
     for table in ("waypoints", "obstacles", "losses"):
-        np.testing.assert_array_equal(getattr(still.course, table), getattr(moving.course, table))
+        np.testing.assert_array_equal(getattr(still.world_map, table), getattr(moving.world_map, table))
 
 
 @pytest.mark.parametrize("off", [{"speed_mps": 0.0, "amplitude_m": 3.0, "share": 0.5}, {"share": 0.0}])
@@ -121,7 +121,7 @@ def test_off_is_as_if_there_were_no_such_section(off):
 
 
 @pytest.mark.parametrize("echo", ["centre", "surface"])
-def test_a_disc_that_moves_is_heard_and_measured_like_one_that_stands_there(echo):
+def test_a_moving_disc_is_detected_and_measured_like_a_fixed_one(echo):
     changes = {"sonar.echo_reports": echo}
     made, still = swarm("multi_obstacle", **changes), swarm("multi_obstacle", 0.0, **changes)
     made.state.eta[0, :, :2] = made.state.before[0] = discs(made)[:3, :2] - [60.0, 0.0]
@@ -129,7 +129,7 @@ def test_a_disc_that_moves_is_heard_and_measured_like_one_that_stands_there(echo
     for _ in range(60):
         go(made)
         still.state.eta[...], still.state.nu[...] = made.state.eta, made.state.nu
-        still.course.obstacles[...] = still.state.obstacles_before[...] = made.course.obstacles
+        still.world_map.obstacles[...] = still.state.obstacles_before[...] = made.world_map.obstacles
         still.observe()
         for name in ("echo", "echo_range", "echo_position"):
             np.testing.assert_array_equal(made.percept[name], still.percept[name])
@@ -139,10 +139,10 @@ def test_a_disc_that_moves_is_heard_and_measured_like_one_that_stands_there(echo
 
 
 def ahead(gap_m, **changes):
-    """A swarm whose first vehicle lies still, stern on, in the way of a disc that comes; the others are far."""
+    """A swarm with its first vehicle at rest in the path of a disc, stern towards it; the others are far."""
     made = swarm(**changes)
-    toward = made.course.obstacle_velocity[0, 0] / 2.0
-    state, (x, y, radius) = made.state, made.course.obstacles[0, 0]
+    toward = made.world_map.obstacle_velocity[0, 0] / 2.0
+    state, (x, y, radius) = made.state, made.world_map.obstacles[0, 0]
     state.eta[0] = [[x, y, math.atan2(toward[1], toward[0])], [900.0, 0.0, 0.0], [900.0, 50.0, 0.0]]
     state.eta[0, 0, :2] += (radius + 1.0 + gap_m) * toward
     state.before[...], state.nu[...] = state.eta[:, :, :2], 0.0
@@ -151,7 +151,7 @@ def ahead(gap_m, **changes):
 
 
 def drift(made, steps):
-    """Contacts that began, and the smallest clearance, of the first vehicle at rest."""
+    """Collisions and smallest clearance of the first vehicle at rest."""
     contacts, clearance = 0, math.inf
     for _ in range(steps):
         made.step(np.zeros((1, N, 2)))
@@ -160,7 +160,7 @@ def drift(made, steps):
     return contacts, clearance
 
 
-def test_a_vehicle_that_lies_still_is_hit_once():
+def test_a_vehicle_at_rest_is_hit_once():
     made = ahead(3.0)
     assert drift(made, 10) == (0, pytest.approx(2.0))
     assert drift(made, 30) == (1, pytest.approx(-4.0))  # 8 m on its way, of which 4 m led to the vehicle's middle
@@ -192,14 +192,14 @@ def test_a_batch_and_a_snapshot_give_the_same_run():
     other.restore(one.snapshot())
     for made in (many, one, other):
         go(made, 90)
-    assert one.course.swing_control_steps[0].any()
+    assert one.world_map.swing_control_steps[0].any()
     for made, w in ((many, 3), (other, 0)):
         np.testing.assert_array_equal(made.state.eta[w], one.state.eta[0])
         np.testing.assert_array_equal(discs(made, w), discs(one))
-        np.testing.assert_array_equal(made.course.obstacle_velocity[w], one.course.obstacle_velocity[0])
+        np.testing.assert_array_equal(made.world_map.obstacle_velocity[w], one.world_map.obstacle_velocity[0])
 
 
-def test_interfaces_agree_and_the_global_state_tells_the_velocity():
+def test_interfaces_agree_and_the_global_state_has_the_velocity():
     made = scenario("multi_obstacle")
     parallel, vector = uuv_marl.parallel_env(made), uuv_marl.vector_env(2, made)
     seen, _ = parallel.reset(seed=4)
@@ -240,15 +240,15 @@ def test_interfaces_agree_and_the_global_state_tells_the_velocity():
         ("starter", {"share": 1.5}, "traffic.share must lie within 0 to 1, got 1.5"),
     ],
 )
-def test_what_can_not_be_is_refused_with_field_value_and_remedy(name, changes, message):
+def test_errors_name_field_value_and_remedy(name, changes, message):
     changes = {**changes, **({"swarm.num_vehicles": 10} if name == "hard_water" else {})}
     with pytest.raises(ScenarioError, match=message):
         scenario(name, **changes)
 
 
-def test_headers_name_it_and_it_needs_no_sea():
+def test_headers_name_it_and_it_needs_no_disturbances():
     made = swarm(share=0.5)
-    assert conditions(made.scenario) == "0.5 of obstacles move at 2 m/s, 8 m to and fro"
+    assert conditions(made.scenario) == "0.5 of obstacles move at 2 m/s, amplitude 8 m"
     assert made.currents is None
 
 

@@ -23,10 +23,10 @@ from typer.testing import CliRunner
 
 from tests.nets import card_for, tensors
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.layers import Architecture
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.cli import app
 from uuv_marl.errors import PolicyError, ResultsError, RewardError, ScenarioError, TrainingError
 from uuv_marl.scenario import parse_override
@@ -307,8 +307,13 @@ import numpy as np
 from uuv_marl.tasks import Task
 from uuv_marl.tasks.reach import Reach
 class Mine(Task):
-    terms = {"still": "-0.5 m/s for each decision", "collision": "-60 for each"}
-    at_goal = Task.arrived_before
+    rewards = {"dense": {"still": "-0.5 m/s for each decision", "collision": "-60 for each"}}
+    def draw(self, world, rng):
+        return super().draw(world, rng)
+    def at_goal(self):
+        return self.swarm.state.alive
+    def done(self):
+        return ~self.swarm.state.alive.any(axis=1)
     def reward(self, running):
         slow = -np.hypot(*np.moveaxis(self.swarm.velocity, -1, 0))
         return {"still": 0.5 * slow, "collision": -60.0 * self.swarm.facts.vehicle_collisions}
@@ -419,7 +424,7 @@ def test_rows_act_as_the_policy_will(beside, tmp_path):
     trainer.save_policy(tmp_path, Record())
     env, learner = trainer.rows, trainer.learner
 
-    policy = make(str(tmp_path), env.groups[0].env.swarm.scenario)
+    policy = make_policy(str(tmp_path), env.groups[0].env.swarm.scenario)
     for _ in range(10):
         expected = policy.act(env.groups[0].env.swarm.percept).copy()
         taken = []
@@ -439,7 +444,7 @@ def test_an_expert_records_the_executed_action_and_acts_as_it_would_alone(beside
     seeds, executed = itertools.count(100_000), []
     env = Rows(training, lambda num: [next(seeds) for _ in range(num)])
     group = env.groups[0]
-    alone = make("scout", group.env.swarm.scenario, 2)
+    alone = make_policy("scout", group.env.swarm.scenario, 2)
     step = group.env.step
     group.env.step = lambda action: executed.append(action) or step(action)
     for _ in range(16):
@@ -642,7 +647,7 @@ def test_the_starter_scenario_is_learned_in_seconds(tmp_path):
     """From nothing to arrival: after 328,000 agent-steps 15 of 16 swarms were seen to arrive without a contact."""
     list(train(tmp_path / "a", Training(scenario="starter", steps=400_000, validations=1, validation_episodes=1)))
     policy = str(tmp_path / "a" / "best")
-    runs = evaluate(with_policy_requirements(policy, load_scenario("starter")), policy, range(10))
+    runs = episodes(with_policy_requirements(policy, load_scenario("starter")), policy, range(10))
     assert sum(run.metrics["task_time_s"] is not None for run in runs if isinstance(run, Run)) >= 7
 
 
@@ -700,7 +705,7 @@ def test_a_network_is_around_a_law_that_ships(law, tmp_path):
     card = card_for(load_scenario("starter")).model_copy(update={"base_controller": law})
     save_checkpoint(tmp_path / WEIGHTS_FILE, card, tensors(card))
     with pytest.raises(PolicyError, match="around one of the laws"):
-        make(str(tmp_path), load_scenario("starter"))
+        make_policy(str(tmp_path), load_scenario("starter"))
 
 
 def test_each_gate_of_a_memory_begins_orthogonal():
@@ -900,9 +905,9 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        ({"ppo": {"learning_rate": (np.inf, 0.1)}}, "ppo.learning_rate.0 should be a finite number, got inf"),
-        ({"ppo": {"noize": 0.1}}, "ppo.noize is unknown; did you mean 'noise'?"),
-        ({"network": {"kind": "cnn"}}, "network.kind should be 'mlp', 'sectors' or 'moments', got 'cnn'"),
+        ({"ppo": {"learning_rate": (np.inf, 0.1)}}, "ppo.learning_rate.0 must be a finite number, got inf"),
+        ({"ppo": {"noize": 0.1}}, "ppo.noize is unknown; did you mean 'ppo.noise'"),
+        ({"network": {"kind": "cnn"}}, "network.kind must be 'mlp', 'sectors' or 'moments', got 'cnn'"),
         ({"minutes": 1, "steps": 100}, "minutes = 1 and steps = 100 are both given; leave one out"),
         ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
         ({"base_controller": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
@@ -915,8 +920,8 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
             "imitation_weight = 2 needs an expert, and none is given; name one, or leave it out",
         ),
         ({"scenario": "lossy"}, "training can't show that a vehicle is lost"),
-        ({"sizes": [0]}, "sizes.0.0 should be greater than or equal to 1, got 0"),
-        ({"sizes": [[5, -1]]}, "sizes.0.1 should be greater than or equal to 0, got -1"),
+        ({"sizes": [0]}, "sizes.0.0 must be greater than or equal to 1, got 0"),
+        ({"sizes": [[5, -1]]}, "sizes.0.1 must be greater than or equal to 0, got -1"),
         ({"extra_scenarios": ["lossy"]}, "training can't show that a vehicle is lost"),
         (
             {"extra_scenarios": ["few_informed"]},

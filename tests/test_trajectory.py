@@ -11,7 +11,7 @@ CORNERS = np.array([[180.0, 180.0], [800.0, 100.0], [500.0, 600.0], [1000.0, 100
 TIMES = arrival_times(CORNERS, 4.0)
 
 
-def test_corners_are_passed_on_time_and_the_end_is_rest():
+def test_corners_are_passed_on_time_and_the_end_is_at_rest():
     for corner, t in zip(CORNERS[:-1], TIMES[:-1], strict=True):
         assert reference(t, CORNERS, TIMES, 3, False)[:2] == pytest.approx(corner)
     assert reference(TIMES[-1], CORNERS, TIMES, 3, False) == (1000.0, 1000.0, 0.0, 0.0)
@@ -36,7 +36,7 @@ def test_padding_after_the_last_corner_is_never_reached():
 
 
 @given(st.floats(0.0, 2.0 * float(TIMES[-1])))
-def test_who_passes_the_end_goes_on_as_before_it(t):
+def test_passing_the_end_keeps_the_velocity(t):
     before, after = (reference(t, CORNERS, TIMES, 3, passes) for passes in (False, True))
     if t < TIMES[-1]:
         assert after == before

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import label
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
@@ -79,7 +79,7 @@ def test_a_map_depends_on_its_seed_alone():
         alone = waters()
         alone.reset(TUNING + w)
         for mine, theirs in zip(
-            (alone.course, alone.state, alone.task.memory), (batch.course, batch.state, batch.task.memory), strict=True
+            (alone.world_map, alone.state, alone.task.memory), (batch.world_map, batch.state, batch.task.memory), strict=True
         ):
             for name, array in mine._asdict().items():
                 np.testing.assert_array_equal(array[0], theirs._asdict()[name][w], err_msg=name)
@@ -160,14 +160,14 @@ def test_one_group_has_its_turn_once_the_other_is_through():
     swarm.state.eta[0, last, :2] = 0.0
     assert (swarm.observe()["right_of_way"][0, :, 0] == first).all()
     swarm.state.collided[0, last] = True  # it has failed: nobody waits for it
-    swarm._tell(np.ones(1, np.bool_))
+    swarm._write_task_fields(np.ones(1, np.bool_))
     assert (percept["right_of_way"] == 1.0).all()
 
 
 @pytest.mark.parametrize("tier", TIERS)
 def test_the_oracle_passes(tier):
     scenario = with_policy_requirements("oracle", load_scenario(tier))
-    batch, policy = BatchedEnv(scenario, 4), make("oracle", scenario, 4)
+    batch, policy = BatchedEnv(scenario, 4), make_policy("oracle", scenario, 4)
     batch.reset(TUNING)
     while not batch.over.all():
         policy.active[:] = ~batch.over
@@ -196,9 +196,9 @@ def test_to_stay_pays_by_the_second_and_all_that_is_left_once_all_are_there():
     ({"task.gap_aside_m": 100.0}, "task.gap_m and task.gap_aside_m must leave a wall on both sides within "
      "task.half_width_m = 120, got 128"),
     ({"task.gap_m": [20.0, 10.0]}, r"task.gap_m must be \[low, high\] with low <= high"),
-    ({"task.gap_m": [1.0, 2.0]}, r"task.gap_m must be above 2, two times collision.hull_radius_m, got \[1.0, 2.0\]"),
+    ({"task.gap_m": [1.0, 2.0]}, r"task.gap_m must be above 2, twice collision.hull_radius_m, got \[1.0, 2.0\]"),
     ({"task.apart_m": 30.0}, "task.apart_m must be at least .*, so that groups .* m long start before the wall"),
-    ({"start.width_m": 210.0}, "the groups must start in the water of task 'two_swarms'"),
+    ({"start.width_m": 210.0}, "the groups must start within the banks of task 'two_swarms'"),
 ])  # fmt: skip
 def test_numbers_that_can_not_be_are_refused(changes, message):
     with pytest.raises(ScenarioError, match=message):
@@ -207,7 +207,7 @@ def test_numbers_that_can_not_be_are_refused(changes, message):
 
 def test_a_carrot_is_ahead_at_its_speed_and_to_starboard_and_ends_at_the_goal():
     scenario = load_scenario("two_swarms")
-    swarm, policy = Swarm(scenario), make("carrot,right_m=7,ahead_m=6,speed=3", scenario)
+    swarm, policy = Swarm(scenario), make_policy("carrot,right_m=7,ahead_m=6,speed=3", scenario)
     swarm.reset(TUNING)
     swarm.state.eta[0, 0, :2] = swarm.world_map.waypoints[0, 0, 1] + (3.0, 0.0)
     percept = swarm.observe()

@@ -185,7 +185,7 @@ def test_what_cannot_be_done_is_named():
     with pytest.raises(ValueError, match="autoreset_mode must be one of 'NextStep', 'SameStep', 'Disabled', got 'no'"):
         short(autoreset_mode="no")
     with pytest.raises(baselines.PolicyError, match=r"SwarmVectorEnv has no agents by name; make the policy with make"):
-        baselines.make("bio_inspired", env)
+        baselines.make_policy("bio_inspired", env)
 
 
 def test_registries():
@@ -216,7 +216,7 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
     scenario = uuv_marl.load_scenario(scenario_name, num_vehicles=6, overrides={**SHORT, **losses})
     env = solo(others, scenario=scenario, num_vehicles=None, info_terms=True)
     whole = uuv_marl.parallel_env(baselines.with_policy_requirements(others, scenario), info_terms=True)
-    policy = baselines.make(others, whole)
+    policy = baselines.make_policy(others, whole)
     rng = np.random.default_rng(0)
     observation, _ = env.reset(seed=8)
     observations, _ = whole.reset(seed=8)
@@ -241,21 +241,21 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
 @pytest.mark.parametrize(
     ("others", "overrides", "message"),
     [
-        ("bio_inspired", {"sonar.channels": ["compass"]}, "can't hold compass: with 'bio_inspired' the learner has no"),
-        ("bio_inspired", {"actuators.yaw_damping_nms": 600.0}, "can't be 600: with 'bio_inspired' all vehicles have 0"),
-        ("mappo", {"timing.decision_period_s": 0.2}, "can't be 0.2: with 'mappo' all vehicles have 0.5; leave"),
-        ("mappo", {"timing": {"decision_period_s": 0.1}}, "can't be 0.1: with 'mappo' all vehicles have 0.5; leave"),
+        ("bio_inspired", {"sonar.channels": ["compass"]}, "can't hold compass: policy 'bio_inspired' requires no"),
+        ("bio_inspired", {"actuators.yaw_damping_nms": 600.0}, "can't be 600: policy 'bio_inspired' requires 0"),
+        ("mappo", {"timing.decision_period_s": 0.2}, "can't be 0.2: policy 'mappo' requires 0.5; leave"),
+        ("mappo", {"timing": {"decision_period_s": 0.1}}, "can't be 0.1: policy 'mappo' requires 0.5; leave"),
     ],
 )
 def test_solo_drops_no_override(others, overrides, message):
     with pytest.raises(ScenarioError, match=message):
         SoloEnv(STARTER, others, overrides=overrides)
-    with pytest.raises(ScenarioError, match="can't be 0.1: with 'mappo' all vehicles have 0.5"):  # though it is usual
+    with pytest.raises(ScenarioError, match="can't be 0.1: policy 'mappo' requires 0.5"):  # though it is usual
         SoloEnv(STARTER, "mappo", decision_period=0.1)
-    with pytest.raises(ScenarioError, match="can't be 0.1: with 'mappo' all vehicles have 0.5"):
+    with pytest.raises(ScenarioError, match="can't be 0.1: policy 'mappo' requires 0.5"):
         SoloEnv(STARTER, "mappo", overrides={"timing": uuv_marl.load_scenario(STARTER).timing})
     hearing = uuv_marl.load_scenario(STARTER, overrides={"sonar.channels": ["compass"]})
-    with pytest.raises(ScenarioError, match="can't hold compass: with 'bio_inspired' the learner has no"):
+    with pytest.raises(ScenarioError, match="can't hold compass: policy 'bio_inspired' requires no"):
         SoloEnv(hearing, "bio_inspired", overrides={"sonar.channels": ["compass"]})
     with pytest.raises(TypeError, match="others must be the name of a policy, or module:Class, got None"):
         SoloEnv(STARTER, None)
@@ -276,9 +276,9 @@ def test_solo_takes_actions_that_can_t_be_written_to(monkeypatch):
 
 @pytest.mark.parametrize("make", [partial(uuv_marl.vector_env, 2), SoloEnv])
 def test_an_argument_that_is_not_there_is_named(make):
-    with pytest.raises(TypeError, match="no argument num_vehicle; did you mean num_vehicles"):
+    with pytest.raises(TypeError, match="no argument 'num_vehicle'; did you mean 'num_vehicles'"):
         make("starter", num_vehicle=3)
-    with pytest.raises(TypeError, match="no argument max_episode_steps; did you mean max_cycles"):
+    with pytest.raises(TypeError, match="no argument 'max_episode_steps'; did you mean 'max_cycles'"):
         make("starter", max_episode_steps=3)
     with pytest.raises(ScenarioError, match=r"decision_period = 0.2 and the override timing.decision_period_s = 0.5"):
         make("starter", decision_period=0.2, overrides={"timing": {"decision_period_s": 0.5}})
@@ -332,7 +332,7 @@ def test_numbers_below_float32s_range_are_zero_whatever_numpy_is_told(action):
     with np.errstate(all="raise"):
         env, alone, whole = uuv_marl.parallel_env("starter"), SoloEnv("starter"), uuv_marl.vector_env(2, "starter")
         observations, _ = env.reset(seed=0)
-        idle = baselines.make("idle", env)
+        idle = baselines.make_policy("idle", env)
         assert idle({agent: np.full(seen.shape, action) for agent, seen in observations.items()})
         env.step({agent: np.full(2, action) for agent in env.agents})
         alone.reset(seed=0)
@@ -388,3 +388,34 @@ def test_arguments_in_another_order_are_refused_with_the_right_one(place, given,
     make = getattr(importlib.import_module(f"uuv_marl.envs.{module}"), name)
     with pytest.raises((ScenarioError, TypeError), match=message.replace("; .* is ", "; the first argument is ")):
         make(*given)
+
+
+@pytest.mark.parametrize(
+    ("place", "first"),
+    [
+        ("parallel_env:parallel_env", ()), ("vector_env:vector_env", (2,)), ("sb3:SwarmVecEnv", ()),
+        ("torchrl:SwarmEnv", (2,)), ("rllib:SwarmMultiAgentEnv", None),
+    ],
+)  # fmt: skip
+def test_every_environment_gives_the_scenario_what_a_policy_requires(place, first):
+    module, _, name = place.partition(":")
+    pytest.importorskip({"sb3": "stable_baselines3", "torchrl": "torchrl", "rllib": "ray"}.get(module, "gymnasium"))
+    cls = getattr(importlib.import_module(f"uuv_marl.envs.{module}"), name)
+
+    def make(**how):
+        return cls(how) if first is None else cls(*first, **how)
+
+    how = {"scenario": STARTER, "num_vehicles": 3, "for_policy": "sdc", "overrides": SHORT}
+    scenario = uuv_marl.load_scenario(STARTER, num_vehicles=3, overrides=SHORT)
+    assert make(**how).scenario == uuv_marl.with_policy_requirements("sdc", scenario) != scenario
+    with pytest.raises(
+        ScenarioError, match="decision_period_s can't be 0.1: policy 'mappo' requires 0.5; leave it out"
+    ):
+        make(scenario=STARTER, for_policy="mappo", decision_period=0.1)
+    with pytest.raises(ScenarioError, match="can't hold link: policy 'bio_inspired' requires no channels; leave it"):
+        make(scenario=STARTER, for_policy="bio_inspired", overrides={"sonar.channels": ["link"]})
+
+
+def test_solo_takes_its_requirements_from_the_others():
+    with pytest.raises(TypeError, match="SoloEnv takes no for_policy: the scenario suits others='bio_inspired'"):
+        SoloEnv(STARTER, for_policy="sdc")

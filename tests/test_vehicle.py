@@ -1,4 +1,4 @@
-"""Laws of the vehicle's dynamics (Eq. 1-4, 22-24)."""
+"""Properties of the vehicle's dynamics (Eq. 1-4, 22-24)."""
 
 import math
 
@@ -22,7 +22,7 @@ TORPEDO = plant(load_scenario("tracking", overrides=LIFT | RUDDER))
 
 @st.composite
 def plants(draw):
-    """Any vehicle that the scenario's own checks let pass."""
+    """Any vehicle that the scenario's checks accept."""
     overrides = {
         "vehicle.x_G_m": draw(st.floats(-0.2, 0.2)),
         "vehicle.Y_rdot_kgm": draw(st.floats(-30.0, 30.0)),

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from research.dynamics import acceptance
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.benchmark import handling
 from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, vehicle_names
 from uuv_marl.scenario.turning import turning_radius
@@ -141,7 +141,7 @@ def test_every_vehicle_and_variant_runs_and_is_shown(name, tmp_path):
         "bio_inspired_plus", load_scenario("single_obstacle", num_vehicles=4, overrides=changes)
     )
     assert scenario.vehicle.name == name
-    swarm, policy = Swarm(scenario), make("bio_inspired_plus", scenario)
+    swarm, policy = Swarm(scenario), make_policy("bio_inspired_plus", scenario)
     percept = swarm.reset(0)
     for _ in range(20):
         percept = swarm.step(policy.act(percept))

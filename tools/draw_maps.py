@@ -8,8 +8,8 @@ from matplotlib.patches import Circle
 from uuv_marl import load_scenario
 from uuv_marl.benchmark.style import BLUE, ORANGE, house_style, panels, save
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.maps import KINDS
 from uuv_marl.tasks.maps.grid_paths import CELL_M, distances, free_cells
+from uuv_marl.tasks.maps.kinds import KINDS
 
 ROOT = Path(__file__).resolve().parent.parent
 SEED = 10_000

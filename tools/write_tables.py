@@ -15,7 +15,8 @@ from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
 from uuv_marl.scenario.task import task_class
 from uuv_marl.sim.observation import closeness_table
-from uuv_marl.tasks import TASKS, Follow, Reach
+from uuv_marl.tasks import TASKS, Follow
+from uuv_marl.tasks.reach import Reach
 
 ROOT = Path(__file__).resolve().parent.parent
 NAMES = ("environment", "results", "scenarios", "tasks", "vehicles")
@@ -49,10 +50,10 @@ def fields(layout: tuple[PerceptField, ...], start: int = 0) -> str:
     """A table of fields with the index range of each."""
     lines: list[tuple[str, ...]] = []
     for field in layout:
-        kind = field.kind
+        quantity = field.quantity
         entries = f"{start}" if field.size == 1 else f"{start}-{start + field.size - 1}"
-        bounds = f"{kind.low / kind.scale:g} to {kind.high / kind.scale:g}"
-        lines.append((entries, f"`{field.name}`", field.meaning, kind.unit, f"{kind.scale:g}", bounds))
+        bounds = f"{quantity.low / quantity.scale:g} to {quantity.high / quantity.scale:g}"
+        lines.append((entries, f"`{field.name}`", field.meaning, quantity.unit, f"{quantity.scale:g}", bounds))
         start += field.size
     return table(("entries", "name", "meaning", "unit", "scale", "bounds (scaled)"), lines)
 
@@ -110,7 +111,8 @@ def filled() -> dict[str, str]:
     scenario, agents = env.scenario, env.possible_agents
     weights = scenario.reward.model_dump()
     terms = [
-        (f"`{name}`", what, f"{weights[name]:g}" if name in weights else "") for name, what in Follow.terms.items()
+        (f"`{name}`", what, f"{weights[name]:g}" if name in weights else "")
+        for name, what in Follow.rewards["dense"].items()
     ]
     text = Path(__file__).with_name("tables.md").read_text(encoding="utf-8")
     values = {
@@ -127,7 +129,7 @@ TABLES = filled() | {
     "scenarios": scenarios(),
     "observation": fields(PerceptLayout.of(load_scenario("single_obstacle")).table),
     "closeness": fields(closeness_table(load_scenario("single_obstacle"))),
-    "reach": table(("term", "value"), [(f"`{name}`", what) for name, what in Reach.terms.items()]),
+    "reach": table(("term", "value"), [(f"`{name}`", what) for name, what in Reach.rewards["dense"].items()]),
     "tasks": table(("name", "what", "numbers of its own"), tasks()),
     "channels": channels(),
     "state": fields(state_table(load_scenario("single_obstacle"))),

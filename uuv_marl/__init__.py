@@ -1,9 +1,9 @@
 """Swarms of unmanned underwater vehicles: a PettingZoo environment, reference controllers and a benchmark.
 
-``parallel_env()``, ``env()`` and ``vector_env(num_envs)`` make environments, ``load_scenario(name)`` a configuration,
-``baselines.make(name, env)`` a controller. ``uuv-marl --help`` shows the command line. Importing registers
-``uuv_marl/Swarm-v1`` and ``uuv_marl/Solo-v1`` with Gymnasium, and ``uuv_marl/uuv_swarm_v1`` with PettingZoo;
-``gymnasium.make("uuv_marl:uuv_marl/Solo-v1")`` imports by itself, in worker processes, too.
+``parallel_env()``, ``env()`` and ``vector_env(num_envs)`` make environments, ``make_policy(name, env)`` a controller,
+``evaluate(name, scenario)`` its metrics, ``load_scenario(name)`` a configuration. ``uuv-marl --help`` shows the command
+line. Importing registers ``uuv_marl/Swarm-v1`` and ``uuv_marl/Solo-v1`` with Gymnasium, and ``uuv_marl/uuv_swarm_v1``
+with PettingZoo; ``gymnasium.make("uuv_marl:uuv_marl/Solo-v1")`` imports the package itself, also in worker processes.
 """
 
 import importlib
@@ -15,6 +15,8 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from uuv_marl import baselines, uuv_swarm_v1
+    from uuv_marl.baselines import make_policy, with_policy_requirements
+    from uuv_marl.benchmark.evaluate import evaluate
     from uuv_marl.envs.parallel_env import env, parallel_env
     from uuv_marl.envs.vector_env import vector_env
     from uuv_marl.scenario import load_scenario, scenario_names
@@ -23,14 +25,20 @@ __all__ = [
     "__version__",
     "baselines",
     "env",
+    "evaluate",
     "load_scenario",
+    "make_policy",
     "parallel_env",
     "scenario_names",
     "uuv_swarm_v1",
     "vector_env",
+    "with_policy_requirements",
 ]
 
 _HOMES = {
+    "evaluate": "uuv_marl.benchmark.evaluate",
+    "make_policy": "uuv_marl.baselines",
+    "with_policy_requirements": "uuv_marl.baselines",
     "env": "uuv_marl.envs.parallel_env",
     "parallel_env": "uuv_marl.envs.parallel_env",
     "vector_env": "uuv_marl.envs.vector_env",
@@ -40,7 +48,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import on first use, so that ``import uuv_marl`` is quick and needs only what is used."""
+    """Import on first use, so that ``import uuv_marl`` is quick."""
     if name in _HOMES:
         return getattr(importlib.import_module(_HOMES[name]), name)
     if name in ("baselines", "uuv_swarm_v1"):

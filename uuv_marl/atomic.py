@@ -1,4 +1,4 @@
-"""Files that are whole at any time, and folders that one command at a time writes to."""
+"""Atomic file writes, and locks on folders."""
 
 import os
 import socket
@@ -16,7 +16,7 @@ _LOCK, _OWNER = ".lock", ".owner"
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn an OSError of the block (a full disk, missing rights) into an ResultsError that names ``path``."""
+    """Turn an OSError within the context (full disk, missing rights) into a ResultsError that names ``path``."""
     try:
         yield
     except OSError as error:
@@ -28,13 +28,10 @@ def writing(path: Path) -> Iterator[None]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A path to write a file to, which takes the place of ``path`` once the block ends well.
+    """A path to write to, which replaces ``path`` at the end of the context.
 
-    A crash, a full disk or an exception at any moment leaves the file as it was before. The path given lies in the same
-    folder, which must exist, and has the same suffix.
-
-    Raises:
-        ResultsError: it can't be written.
+    A crash, a full disk or an exception leaves the previous file unchanged. The path is in the same folder, which must
+    exist, and has the same suffix. Raises ResultsError if it can't be written.
     """
     partial = path.with_name(f"{path.stem}.partial{path.suffix}")
     with writing(path):
@@ -48,25 +45,24 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file in UTF-8, whole or not at all; line ends stay as they are. Raises ResultsError."""
+    """Write a text file in UTF-8 atomically, with line ends unchanged. Raises ResultsError."""
     with replacing(path) as partial:
         partial.write_text(text, encoding="utf-8", newline="")
 
 
 @contextmanager
 def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
-    """Keep a folder for the block alone, and make it where it is missing.
+    """Lock a folder for this context, and create it if it is missing.
 
-    The operating system holds the lock and frees it when the process ends, however it ends. Two hidden files stay in
-    the folder: ``.lock``, and while it is held ``.owner``, which says by whom. A folder that was made here and stays
-    empty goes again.
+    The operating system holds the lock and frees it when the process ends. Two hidden files remain in the folder:
+    ``.lock``, and while locked ``.owner``, which names the process. A folder created here that stays empty is removed.
 
     Args:
-        folder: that only this block may write to.
-        wait_s: how long to wait for another's block to end [s].
+        folder: folder to lock.
+        wait_s: longest wait for another context to end [s].
 
     Raises:
-        ResultsError: another block has the folder, in this process or another, or it can't be written.
+        ResultsError: another context has locked the folder, in this process or another, or it can't be written.
     """
     lock, owner, is_new = FileLock(folder / _LOCK), folder / _OWNER, not folder.exists()
     with writing(folder):

@@ -1,4 +1,4 @@
-"""Optional libraries: where one is missing, the message names the extra that brings it; and how they are made quiet."""
+"""Optional libraries: messages that name the extra to install, and quiet loggers."""
 
 import logging
 import os
@@ -10,11 +10,11 @@ from uuv_marl.errors import MissingExtraError, PictureError
 
 @contextmanager
 def extra(name: str, what: str | None = None) -> Iterator[None]:
-    """Imports of an extra's libraries belong into this block.
+    """Context for imports of an extra's libraries.
 
     Args:
-        name: of the extra, as in ``pip install 'uuv_marl[train]'``.
-        what: what needs the library, as the message names it; by default the import itself.
+        name: name of the extra, as in ``pip install 'uuv_marl[train]'``.
+        what: feature that needs the library, for the message; by default the import itself.
 
     Raises:
         MissingExtraError: one of the libraries is missing.
@@ -33,7 +33,7 @@ def extra(name: str, what: str | None = None) -> Iterator[None]:
 
 @contextmanager
 def pictures() -> Iterator[None]:
-    """Imports of Matplotlib belong into this block. Raises PictureError where it refuses the variable MPLBACKEND."""
+    """Context for imports of Matplotlib. Raises PictureError if it rejects the variable MPLBACKEND."""
     try:
         yield
     except ValueError as error:
@@ -47,7 +47,7 @@ def pictures() -> Iterator[None]:
 
 @contextmanager
 def silenced(logger: str, level: int) -> Iterator[None]:
-    """Let a library's logger tell nothing below this level for the block alone. To be entered once it is imported."""
+    """Suppress a library's log messages below a level within the context. Enter it after the library's import."""
     log = logging.getLogger(logger)
     before = log.level
     log.setLevel(level)

@@ -1,10 +1,10 @@
-"""Code of a user's own, by name: ``module:attribute``."""
+"""User code by name: ``module:attribute``."""
 
 import importlib
 
 
 def named_object(name: str) -> object:
-    """What ``module:attribute`` names. Raises ImportError with the reason, in words that follow the name."""
+    """The object that ``module:attribute`` names. Raises ImportError with a reason that continues the name."""
     module, _, attribute = name.partition(":")
     try:
         return getattr(importlib.import_module(module), attribute)

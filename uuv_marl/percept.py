@@ -1,4 +1,4 @@
-"""Percept: what one vehicle knows, in its body frame, and the one table that orders, scales and bounds it.
+"""Percept: what one vehicle observes, in its body frame, and the one declaration of its fields.
 
 A percept is a flat float32 vector in physical units; its fields are views of it. Scales are powers of two, so that
 dividing by them (the observation) and multiplying again loses nothing.
@@ -7,7 +7,7 @@ dividing by them (the observation) and multiplying again loses nothing.
 import dataclasses
 import functools
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, get_type_hints
 
 import numpy as np
 
@@ -20,8 +20,8 @@ MAX_SPEED = 64.0
 _MAX_VEHICLES = 16384.0
 
 
-class Kind(NamedTuple):
-    """What numbers of a field are: their unit, the scale of an observation, and bounds at which they saturate."""
+class Quantity(NamedTuple):
+    """Unit of a field's numbers, scale of their observation, and bounds at which they saturate."""
 
     unit: str
     scale: float
@@ -29,22 +29,85 @@ class Kind(NamedTuple):
     high: float
 
 
-POSITION = Kind("m", 64.0, -MAX_RANGE_M, MAX_RANGE_M)
-LENGTH = Kind("m", 64.0, 0.0, MAX_RANGE_M)
-SPEED = Kind("m/s", 4.0, -MAX_SPEED, MAX_SPEED)
-YAW_RATE = Kind("rad/s", 1.0, -MAX_SPEED, MAX_SPEED)
-FLAG = Kind("1", 1.0, 0.0, 1.0)
-DIRECTION = Kind("1", 1.0, -1.0, 1.0)
-AGE = Kind("s", 1.0, 0.0, 4096.0)
-IDENTITY = Kind("1", _MAX_VEHICLES, 0.0, _MAX_VEHICLES)
+POSITION = Quantity("m", 64.0, -MAX_RANGE_M, MAX_RANGE_M)
+LENGTH = Quantity("m", 64.0, 0.0, MAX_RANGE_M)
+SPEED = Quantity("m/s", 4.0, -MAX_SPEED, MAX_SPEED)
+YAW_RATE = Quantity("rad/s", 1.0, -MAX_SPEED, MAX_SPEED)
+FLAG = Quantity("1", 1.0, 0.0, 1.0)
+DIRECTION = Quantity("1", 1.0, -1.0, 1.0)
+AGE = Quantity("s", 1.0, 0.0, 4096.0)
+IDENTITY = Quantity("1", _MAX_VEHICLES, 0.0, _MAX_VEHICLES)
+
+
+# fmt: off
+class Fields(NamedTuple):
+    """Views of the fields that ``FIELDS`` declares, shape (world, vehicle, *axes); empty where the channel is absent.
+
+    ``Annotated`` holds each field's axes, quantity, meaning and, unless every percept has it, the channel that adds it.
+    """
+
+    velocity: Annotated[Float32, "2", SPEED, "own surge and sway velocity over ground (current.velocity)"]
+    yaw_rate: Annotated[Float32, "1", YAW_RATE, "own yaw rate"]
+    reference: Annotated[Float32, "2", POSITION, "vector to the reference point l(t); a longer one is cut to 4096 m"]
+    reference_velocity: Annotated[Float32, "2", SPEED, "velocity of the reference point"]
+    detected: Annotated[Float32, "sector", FLAG, "per sub-sector: 1 if a vehicle is detected in it, else 0"]
+    neighbour: Annotated[Float32, "sector 2", POSITION, "per sub-sector: position of the nearest vehicle, else 0"]
+    echo: Annotated[Float32, "active", FLAG, "per active sub-sector: 1 if an obstacle returns an echo, else 0"]
+    echo_range: Annotated[
+        Float32, "active", LENGTH, "per active sub-sector: range to the nearest obstacle's surface in it, else 0"]
+    echo_position: Annotated[
+        Float32, "active 2", POSITION,
+        "per active sub-sector: position of its centre, or of that surface point (sonar.echo_reports), else 0"]
+    compass: Annotated[Float32, "2", DIRECTION, "cosine and sine of the heading from north", "compass"]
+    link_identity: Annotated[
+        Float32, "sector", IDENTITY, "per sub-sector: 1 + index of the vehicle detected, else 0", "link"]
+    link_velocity: Annotated[
+        Float32, "sector 2", SPEED, "per sub-sector: velocity of that vehicle over ground, else 0", "link"]
+
+
+class DisturbanceFields(NamedTuple):
+    """As ``Fields``, for the channels that only a disturbed world's code writes; they follow in the flat vector."""
+
+    ground_velocity: Annotated[Float32, "2", SPEED, "own surge and sway velocity over ground", "current"]
+    water_velocity: Annotated[Float32, "2", SPEED, "own surge and sway velocity through the water", "current"]
+    age: Annotated[Float32, "sector", AGE, "per sub-sector: time since the reception of its reading", "age"]
+    ranged: Annotated[Float32, "sector", FLAG, "per sub-sector: 1 if the array measures ranges, else 0", "ranged"]
+    modem_identity: Annotated[
+        Float32, "sector", IDENTITY,
+        "per sub-sector: 1 + index of the vehicle detected, once a message of it has arrived, else 0", "modem"]
+    modem_velocity: Annotated[
+        Float32, "sector 2", SPEED, "per sub-sector: velocity over ground of that vehicle when it sent", "modem"]
+    modem_age: Annotated[Float32, "sector", AGE, "per sub-sector: time since that message was sent", "modem"]
+# fmt: on
+
+
+class FieldSpec(NamedTuple):
+    """Declaration of a field: its axes ("sector" and "active" count sub-sectors) and its channel, "" for none."""
+
+    axes: str
+    quantity: Quantity
+    meaning: str
+    channel: str = ""
+
+
+FIELDS = {
+    name: FieldSpec(*annotated.__metadata__)
+    for table in (Fields, DisturbanceFields)
+    for name, annotated in get_type_hints(table, include_extras=True).items()
+}
+"""Every field that a percept can have beside its task's, in order."""
+CHANNELS = tuple(dict.fromkeys(spec.channel for spec in FIELDS.values() if spec.channel))
+"""Names in ``sonar.channels`` that add fields."""
+Starts = tuple[int, ...]
+"""Index in a flat percept at which each of ``FIELDS`` starts, -1 where it is absent."""
 
 
 class PerceptField(NamedTuple):
-    """One row of the table."""
+    """One row of the table of a percept, of an observation or of a state."""
 
     name: str
     shape: tuple[int, ...]
-    kind: Kind
+    quantity: Quantity
     meaning: str
 
     @property
@@ -53,119 +116,36 @@ class PerceptField(NamedTuple):
         return math.prod(self.shape)
 
 
-Table = tuple[PerceptField, ...]
-
-
-def _sonar(sectors: int, active: int) -> Table:
-    return (
-        PerceptField("velocity", (2,), SPEED, "own surge and sway velocity over ground (current.velocity)"),
-        PerceptField("yaw_rate", (1,), YAW_RATE, "own yaw rate"),
-        PerceptField("reference", (2,), POSITION, "vector to the reference point l(t); a longer one is cut to 4096 m"),
-        PerceptField("reference_velocity", (2,), SPEED, "velocity of the reference point"),
-        PerceptField("detected", (sectors,), FLAG, "per sub-sector: 1 if a vehicle is heard (the nearest), else 0"),
-        PerceptField("neighbour", (sectors, 2), POSITION, "per sub-sector: that vehicle's position, else 0"),
-        PerceptField("echo", (active,), FLAG, "per active sub-sector: 1 if an obstacle returns an echo, else 0"),
-        PerceptField(
-            "echo_range", (active,), LENGTH,
-            "per active sub-sector: range to the nearest obstacle's surface in it, else 0",
-        ),
-        PerceptField(
-            "echo_position", (active, 2), POSITION,
-            "per active sub-sector: position of its centre, or of that surface point (sonar.echo_reports), else 0",
-        ),
-    )  # fmt: skip
-
-
-def _compass(_sectors: int, _active: int) -> Table:
-    return (PerceptField("compass", (2,), DIRECTION, "cosine and sine of the heading from north"),)
-
-
-def _link(sectors: int, _active: int) -> Table:
-    return (
-        PerceptField("link_identity", (sectors,), IDENTITY, "per sub-sector: 1 + index of the vehicle heard, else 0"),
-        PerceptField(
-            "link_velocity", (sectors, 2), SPEED, "per sub-sector: velocity of that vehicle over ground, else 0"
-        ),
-    )
-
-
-def _current(_sectors: int, _active: int) -> Table:
-    return (
-        PerceptField("ground_velocity", (2,), SPEED, "own surge and sway velocity over ground"),
-        PerceptField("water_velocity", (2,), SPEED, "own surge and sway velocity through the water"),
-    )
-
-
-def _age(sectors: int, _active: int) -> Table:
-    return (PerceptField("age", (sectors,), AGE, "per sub-sector: time since the reception of its reading"),)
-
-
-def _ranged(sectors: int, _active: int) -> Table:
-    return (PerceptField("ranged", (sectors,), FLAG, "per sub-sector: 1 if the array measures ranges, else 0"),)
-
-
-def _modem(sectors: int, _active: int) -> Table:
-    return (
-        PerceptField("modem_identity", (sectors,), IDENTITY, "per sub-sector: 1 + index of the vehicle heard, where a "
-                     "message of it has arrived, else 0"),
-        PerceptField("modem_velocity", (sectors, 2), SPEED, "per sub-sector: its velocity over ground when it sent"),
-        PerceptField("modem_age", (sectors,), AGE, "per sub-sector: time since it sent"),
-    )  # fmt: skip
-
-
-CHANNELS = {
-    "compass": _compass, "link": _link, "current": _current, "age": _age, "ranged": _ranged, "modem": _modem
-}  # fmt: skip
-"""Rows that a channel adds, by its name in ``sonar.channels``, in the order of the table."""
+FieldTable = tuple[PerceptField, ...]
 
 
 @functools.cache
-def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] = tuple(CHANNELS)) -> Table:
-    """The fields of a percept in order. Everything is relative to the vehicle: x forward, y starboard."""
-    with_policy_requirements = (rows(num_sectors, num_active) for name, rows in CHANNELS.items() if name in channels)
-    return sum(with_policy_requirements, _sonar(num_sectors, num_active))
+def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] = CHANNELS) -> FieldTable:
+    """Fields of a percept in order. Everything is relative to the vehicle: x forward, y starboard."""
+    sizes = {"1": 1, "2": 2, "sector": num_sectors, "active": num_active}
+    return tuple(
+        PerceptField(name, tuple(sizes[axis] for axis in spec.axes.split()), spec.quantity, spec.meaning)
+        for name, spec in FIELDS.items()
+        if not spec.channel or spec.channel in channels
+    )
 
 
-def task_fields(scenario: Scenario) -> Table:
-    """Rows that a scenario's task tells: those it always does, and those of its own channels that are granted."""
-    kind, with_policy_requirements = scenario.task_class, scenario.sonar.channels
-    rows: Table = kind.observed
-    return sum((own for name, own in kind.channels.items() if name in with_policy_requirements), rows)
-
-
-class Starts(NamedTuple):
-    """Where each field that there can be starts in a flat percept, -1 where it is absent."""
-
-    velocity: int
-    yaw_rate: int
-    reference: int
-    reference_velocity: int
-    detected: int
-    neighbour: int
-    echo: int
-    echo_range: int
-    echo_position: int
-    compass: int
-    link_identity: int
-    link_velocity: int
-    ground_velocity: int
-    water_velocity: int
-    age: int
-    ranged: int
-    modem_identity: int
-    modem_velocity: int
-    modem_age: int
+def task_fields(scenario: Scenario) -> FieldTable:
+    """Fields that a scenario's task writes: those it always adds, and those of its channels in ``sonar.channels``."""
+    task, channels = scenario.task_class, scenario.sonar.channels
+    rows: FieldTable = task.observed
+    return sum((added for name, added in task.channels.items() if name in channels), rows)
 
 
 @dataclasses.dataclass(frozen=True)
 class PerceptLayout:
     """A table with its positions in the flat vector."""
 
-    table: tuple[PerceptField, ...]
+    table: FieldTable
 
     @staticmethod
     def of(scenario: Scenario) -> "PerceptLayout":
-        """The layout that a scenario's sonar suite, channels and task make."""
+        """The layout that a scenario's sonar suite, channels and task result in."""
         sonar = scenario.sonar
         own = percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels)
         return PerceptLayout(own + task_fields(scenario))
@@ -183,62 +163,58 @@ class PerceptLayout:
 
     @functools.cached_property
     def offsets(self) -> Starts:
-        """First index of every field that there can be, -1 where absent."""
-        return Starts(**{field.name: self.starts.get(field.name, -1) for field in percept_table(0, 0)})
+        """First index of each of ``FIELDS``, -1 where it is absent."""
+        return tuple(self.starts.get(name, -1) for name in FIELDS)
 
     @functools.cached_property
     def message_offsets(self) -> Starts:
-        """``offsets``, the modem's fields in place of the link's, whose shapes are the same."""
-        at = self.offsets
-        return at._replace(link_identity=at.modem_identity, link_velocity=at.modem_velocity)
+        """``offsets`` with the modem's fields in place of the link's, which have the same shapes."""
+        return tuple(self.starts.get(name.replace("link_", "modem_"), -1) for name in FIELDS)
 
     @functools.cached_property
     def scale(self) -> Float32:
         """Unit of each observation entry, in physical units; powers of two. Shape (size,)."""
-        return self._spread([field.kind.scale for field in self.table])
+        return self._spread([field.quantity.scale for field in self.table])
 
     @functools.cached_property
     def low(self) -> Float32:
         """Lower bound of each observation entry (scaled). Shape (size,)."""
-        return self._spread([field.kind.low / field.kind.scale for field in self.table])
+        return self._spread([field.quantity.low / field.quantity.scale for field in self.table])
 
     @functools.cached_property
     def high(self) -> Float32:
         """Upper bound of each observation entry (scaled). Shape (size,)."""
-        return self._spread([field.kind.high / field.kind.scale for field in self.table])
+        return self._spread([field.quantity.high / field.quantity.scale for field in self.table])
 
     def _spread(self, values: list[float]) -> Float32:
         return np.repeat(np.array(values, np.float32), [field.size for field in self.table])
 
 
 class Clock(NamedTuple):
-    """When a percept was heard. The arrays are the swarm's own: they show the present."""
+    """Time of a percept. The arrays are the swarm's own and always show the present."""
 
     time_s: Float64
-    """Since the reset, shape (world,)."""
+    """Time since the reset, shape (world,)."""
     episode: UInt64
-    """A number that every reset changes, except one with the same seed, shape (world,)."""
+    """Key of the episode, which every reset changes except one with the same seed, shape (world,)."""
     seed: UInt64
-    """Seed of the episode, or ``episode`` where its reset had none, shape (world,), for policies that draw."""
+    """Seed of the episode, or ``episode`` where its reset had none, shape (world,), for random policies."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Percept:
-    """What vehicles know: ``flat`` of shape (..., layout.size), float32, physical units; its fields as views.
+    """What vehicles observe: ``flat`` of shape (..., layout.size), float32, physical units; its fields as views.
 
-    ``velocity`` (..., 2), ``yaw_rate`` (..., 1), ``reference`` (..., 2), ``reference_velocity`` (..., 2),
-    ``heard`` (..., sector), ``neighbour`` (..., sector, 2), ``echo`` (..., active), ``echo_range`` (..., active),
-    ``echo_position`` (..., active, 2), and where their channels are granted ``compass`` (..., 2), ``link_identity``
-    (..., sector), ``link_velocity`` (..., sector, 2) and those of docs/scenarios.md. Any of them by
-    ``percept["name"]``; ``percept.names`` lists those there are.
+    ``percept["neighbour"]`` is a field by its name in ``FIELDS`` or the task's table, shape (..., *axes);
+    ``percept.names`` lists the fields that it has.
     """
 
     flat: Float32
     layout: PerceptLayout
     clock: Clock | None = None
-    """When this was perceived, where the swarm itself gives the percept; None for one made of observations."""
+    """Time of this percept where it comes from the swarm; None for one made from observations."""
     alive: Bool | None = None
-    """False for lost vehicles, whose rows are zero, shape (world, vehicle); None where nobody says."""
+    """False for lost vehicles (rows of zeros), shape (world, vehicle); None where it is unknown."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -250,19 +226,18 @@ class Percept:
         return f"Percept(flat {self.flat.shape}; {fields})"
 
     def __getitem__(self, name: str) -> Float32:
-        """A field by name, as a view. Raises KeyError where there is none, or where its channel is not granted."""
+        """View of a field, shape (..., *axes). Raises KeyError where it or its channel is absent."""
         if name not in self.layout.starts:
             near = hint(str(name), self.names, 0.6)
             raise KeyError(f"percept has no field {name!r}; {near}It has {', '.join(self.names)}")
-        start = self.layout.starts[name]
-        field = next(field for field in self.layout.table if field.name == name)
+        start, field = self.layout.starts[name], next(field for field in self.layout.table if field.name == name)
         return self.flat[..., start : start + field.size].reshape(*self.flat.shape[:-1], *field.shape)
 
     def to_observation(self) -> Float32:
-        """The scaled flat vector that environments hand out: a new array."""
+        """The scaled flat vector that environments return, shape (..., layout.size): a new array."""
         return self.flat / self.layout.scale
 
     @staticmethod
     def from_observation(observation: Float32, layout: PerceptLayout) -> "Percept":
-        """The percept back from an observation, bit for bit."""
+        """The percept of an observation, shape (..., layout.size), bit for bit."""
         return Percept(observation * layout.scale, layout)

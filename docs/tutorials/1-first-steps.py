@@ -47,7 +47,7 @@ from uuv_marl.percept import Percept, PerceptLayout
 
 layout = PerceptLayout.of(env.scenario)
 percept = Percept.from_observation(observations["uuv_0"], layout)
-rows = [(layout.starts[f.name], f.size, f.kind.unit, f.kind.scale) for f in layout.table]
+rows = [(layout.starts[f.name], f.size, f.quantity.unit, f.quantity.scale) for f in layout.table]
 pd.DataFrame(rows, index=list(percept.names), columns=["first entry", "entries", "unit", "scale"])
 
 # %% [markdown]

@@ -24,7 +24,7 @@ from uuv_marl import baselines
 class Careful(baselines.Policy):
     """Move to l(t), and away from every detected vehicle and obstacle."""
 
-    yaw_damping_nms = 600.0  # an inner loop that brakes turns
+    requirements = baselines.PolicyRequirements(yaw_damping_nms=600.0)  # an inner loop that brakes turns
 
     def decide(self, percept):
         detected = np.concatenate([percept["detected"], percept["echo"]], axis=-1)[..., None]

@@ -23,7 +23,7 @@ def close_and_careful(swarm: Swarm) -> NDArray[np.float64]:
 if __name__ == "__main__":
     scenario = baselines.with_policy_requirements("bio_inspired_plus", uuv_marl.load_scenario("starter"))
     env = uuv_marl.parallel_env(scenario, reward=close_and_careful)
-    policy = baselines.make("bio_inspired_plus", env)
+    policy = baselines.make_policy("bio_inspired_plus", env)
     observations, _ = env.reset(seed=0)
     total = 0.0
     while env.agents:

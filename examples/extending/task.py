@@ -22,7 +22,9 @@ class Rendezvous(Task):
         near_m: Positive = 10.0
 
     observed: ClassVar[tuple[PerceptField, ...]] = (PerceptField("near", (1,), FLAG, "1 within near_m of the centre"),)
-    terms: ClassVar[Mapping[str, str]] = {"away": "-0.01/m for each decision", "collision": "-10 for each"}
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "dense": {"away": "-0.01/m for each decision", "collision": "-10 for each"}
+    }
     columns: ClassVar[Mapping[str, str]] = {"spread_m": "mean distance from the centre at the end [m]"}
 
     def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:

@@ -43,7 +43,7 @@ class Tide(BaseParallelWrapper[str, Any, Any]):
 if __name__ == "__main__":
     changed = uuv_marl.load_scenario("starter", overrides={"current.speed_mps": 0.8, "current.direction_deg": 90.0})
     env = uuv_marl.parallel_env(baselines.with_policy_requirements("bio_inspired_plus", changed))
-    tidal, policy, eastward = Tide(env), baselines.make("bio_inspired_plus", env), list[float]()
+    tidal, policy, eastward = Tide(env), baselines.make_policy("bio_inspired_plus", env), list[float]()
     observations, infos = tidal.reset(seed=0)
     while tidal.agents:
         observations, _, _, _, infos = tidal.step(policy(observations))

@@ -11,7 +11,7 @@ import numpy as np
 
 from research.data import read_toml
 from research.paper.ledger import difference
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.suite import Case
@@ -91,7 +91,7 @@ def case(values: Mapping[str, Value], scenario: str, seeds: Sequence[int] | None
 
 def runs(of: Case) -> Iterator[Run]:
     """Episodes of a case."""
-    return (run for run in evaluate(of.load(), of.policy, of.seeds or (), **of.parameters) if isinstance(run, Run))
+    return (run for run in episodes(of.load(), of.policy, of.seeds or (), **of.parameters) if isinstance(run, Run))
 
 
 def measure(values: Mapping[str, Value], seeds: Sequence[int] = SEEDS) -> Numbers:

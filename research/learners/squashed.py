@@ -1,11 +1,12 @@
 """``Squashed``: a policy whose layers end in tanh, as those of SAC do, from a file of its weights."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import safetensors.numpy
 
 from uuv_marl.baselines import Policy
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.errors import PolicyError
 from uuv_marl.paths import user_path
 from uuv_marl.percept import Percept
@@ -21,9 +22,7 @@ class Squashed(Policy):
         path: of the weights ``0.weight`` (in, out), ``0.bias`` and so on.
     """
 
-    yaw_damping_nms: ClassVar[float] = 600.0
-    decision_period_s: ClassVar[float | None] = 0.5
-    outputs_force: ClassVar[bool] = True
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, decision_period_s=0.5, outputs_force=True)
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, path: str) -> None:
         super().__init__(scenario, num_worlds)

@@ -9,8 +9,8 @@ from research.data import read_text
 from research.episodes import Row, grouped, measured, short
 from research.second import runnable
 from research.tasks.studies import STUDIES, Study, set_name
-from uuv_marl.baselines.making import uses_identity
-from uuv_marl.baselines.registry import is_trained, policy_class
+from uuv_marl.baselines.making import policy_requirements
+from uuv_marl.baselines.registry import is_trained
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.scenario import load_scenario
 from uuv_marl.types import Float64
@@ -122,7 +122,8 @@ def _final(groups: Groups, study: Study) -> str:
 
 def named(policy: str) -> str:
     """A policy with its extra observations."""
-    beyond = [*policy_class(runnable(policy)).channels, *(["identity"] if uses_identity(runnable(policy)) else [])]
+    required = policy_requirements(runnable(policy))
+    beyond = [*required.channels, *(["identity"] if required.identity else [])]
     return f"{policy} with {', '.join(beyond)}" if beyond else policy
 
 

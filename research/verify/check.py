@@ -13,7 +13,7 @@ from research.verify.rows import NoEpisodesError, Row, rows_of
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
 from uuv_marl.baselines.names import parse_name
-from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
+from uuv_marl.benchmark.evaluate import Run, blaming, episodes
 from uuv_marl.benchmark.results import FILE
 from uuv_marl.errors import MENDABLE, DivergenceError, PolicyError, ResultsError
 
@@ -126,7 +126,7 @@ def _rerun(row: Row, report: Callable[[float], None]) -> Run:
         raise ResultsError(f"seed must be a whole number, got {row.cells['seed']!r}")
     source, seed = row.kind.source(row.cells), int(row.cells["seed"])
     with blaming(source.policy):
-        for event in evaluate(with_policy_requirements(source.policy, source.scenario), source.policy, [seed], None):
+        for event in episodes(with_policy_requirements(source.policy, source.scenario), source.policy, [seed], None):
             if isinstance(event, Run):
                 return event
             report(event.share)

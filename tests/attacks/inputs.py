@@ -21,7 +21,7 @@ import uuv_marl
 from tests.nets import ANYWHERE
 from tests.players import CYCLES, PLAYERS, compare, suited
 from uuv_marl import load_scenario, scenario_names
-from uuv_marl.baselines import POLICIES, make, with_policy_requirements
+from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import DivergenceError, PolicyError, ResultsError, ScenarioError
@@ -122,7 +122,7 @@ def scenarios_that_run(rng, folder):
     name = pick(rng, ("bio_inspired", "sff", "sdc", "mappo"))
     try:
         suited = with_policy_requirements(name, scenario)
-        policy = make(name, suited)
+        policy = make_policy(name, suited)
     except (PolicyError, ScenarioError):
         return
     swarm = Swarm(suited)
@@ -194,9 +194,9 @@ def odd_arguments(rng, folder):
         lambda: uuv_marl.vector_env(2, "starter").reset(seed=thing),
         lambda: Swarm(load_scenario("starter"), thing),
         lambda: Swarm(load_scenario("starter"), 2).reset(thing),
-        lambda: make("random", load_scenario("starter"), 2).reset(thing),
-        lambda: make(thing, load_scenario("starter")),
-        lambda: make("idle", thing),
+        lambda: make_policy("random", load_scenario("starter"), 2).reset(thing),
+        lambda: make_policy(thing, load_scenario("starter")),
+        lambda: make_policy("idle", thing),
     )
     if isinstance(thing, int | float) and not isinstance(thing, bool) and not math.isnan(thing) and abs(thing) > 1e4:
         calls = calls[:6]  # a swarm of 2^31 worlds is a wish, and no mistake
@@ -288,7 +288,7 @@ def foreign_percepts(rng, folder):
     name = pick(rng, ANYWHERE)
     n, worlds = int(rng.integers(1, 7)), int(rng.integers(1, 4))
     scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=n))
-    policy = make(name, scenario, worlds)
+    policy = make_policy(name, scenario, worlds)
     policy.reset(0)
     other = with_policy_requirements(
         pick(rng, (name, "sdc", "idle")), load_scenario("single_obstacle", num_vehicles=int(rng.integers(1, 7)))
@@ -379,7 +379,7 @@ def checkpoints(rng, folder):
     path = folder / "policy.safetensors"
     path.write_bytes(bytes(data))
     scenario = with_policy_requirements(str(folder), load_scenario("random_field", num_vehicles=4))
-    policy, swarm = make(str(folder), scenario), Swarm(scenario)
+    policy, swarm = make_policy(str(folder), scenario), Swarm(scenario)
     finite(policy.act(swarm.reset(0)))
 
 
@@ -433,7 +433,7 @@ def prepare(folder):
     assert done.exit_code == 0, done.output
     for name in ANYWHERE:
         scenario = with_policy_requirements(name, load_scenario("single_obstacle"))
-        make(name, scenario).act(Swarm(scenario).reset(0))
+        make_policy(name, scenario).act(Swarm(scenario).reset(0))
     for name in scenario_names():
         env = uuv_marl.parallel_env(load_scenario(name, overrides={"current.speed_mps": 0.1}))  # what the sea does, too
         env.reset(seed=0)

@@ -1,15 +1,15 @@
-"""Forces that the comparators share: to pass an obstacle on the vehicle's own side, and to balance the drag."""
+"""Obstacle terms and drag that several controllers share."""
 
 import math
 
 from uuv_marl.baselines.policy import Limits, surge_resistance
+from uuv_marl.percept import Fields
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields
 
 
 @compiled
 def bump(share: float) -> float:
-    """1 at 0, falling smoothly to 0 at 1 and beyond (a raised cosine)."""
+    """A raised cosine: 1 at 0, falling smoothly to 0 at 1 and beyond."""
     if share >= 1.0:
         return 0.0
     return 0.5 * (1.0 + math.cos(math.pi * max(share, 0.0)))
@@ -17,9 +17,9 @@ def bump(share: float) -> float:
 
 @compiled
 def obstacle_at(w: int, i: int, a: int, see: Fields, centres: bool) -> tuple[float, float, float, float]:
-    """Where the obstacle of an echo lies: a unit vector towards it, the distance to its surface and its radius [m].
+    """Unit vector towards the obstacle of an echo, the distance to its surface and its radius [m].
 
-    The radius is the distance from surface to centre; 0 if echoes are points of surfaces, whose radius is unknown.
+    The radius is 0 where echoes are points of surfaces, whose radius is unknown.
     """
     n_x, n_y = float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1])
     reach, distance = float(see.echo_range[w, i, a]), math.hypot(n_x, n_y)
@@ -33,8 +33,9 @@ def pass_obstacle(
 ) -> tuple[float, float]:
     """Force [N] from the nearest echo: away from it, and sideways while the vehicle moves towards it.
 
-    The nearest echo acts as a beta-agent (Olfati-Saber 2006). The sideways push goes to the side on which the vehicle
-    already passes, port if dead ahead. Strengths in N, ranges in m. At their ranges to the surface the pushes vanish.
+    The nearest echo acts as a beta-agent (Olfati-Saber 2006). The sideways push is to the side on which the vehicle
+    already passes, port if the echo is dead ahead. Strengths in N; the pushes vanish at their ranges from the surface
+    [m].
     """
     nearest, reach = -1, math.inf
     for a in range(see.echo.shape[2]):
@@ -42,9 +43,7 @@ def pass_obstacle(
             nearest, reach = a, float(see.echo_range[w, i, a])
     if nearest < 0:
         return 0.0, 0.0
-    n_x, n_y = float(see.echo_position[w, i, nearest, 0]), float(see.echo_position[w, i, nearest, 1])
-    distance = math.hypot(n_x, n_y)
-    n_x, n_y = (n_x / distance, n_y / distance) if distance > 0.0 else (1.0, 0.0)
+    n_x, n_y, _, _ = obstacle_at(w, i, nearest, see, False)
     g_x, g_y = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     speed = math.hypot(g_x, g_y)
     g_x, g_y = (g_x / speed, g_y / speed) if speed > 0.1 else (1.0, 0.0)
@@ -57,5 +56,5 @@ def pass_obstacle(
 
 @compiled
 def own_drag(u: float, limits: Limits) -> float:
-    """Surge resistance [N] at a vehicle's own surge velocity [m/s]."""
+    """Surge resistance [N] at a vehicle's surge velocity [m/s]."""
     return surge_resistance(abs(u), limits) * u

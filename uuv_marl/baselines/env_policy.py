@@ -1,4 +1,4 @@
-"""``EnvPolicy``: a policy that acts in an environment from its observations, through any interface."""
+"""``EnvPolicy``: a policy that maps an environment's observations to its actions, through any interface."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, cast, overload
@@ -15,7 +15,7 @@ from uuv_marl.types import Float32, Int64
 
 
 class HasSwarm(Protocol):
-    """The part of an environment that ``make`` needs. A wrapper has it, if its ``unwrapped`` is our environment."""
+    """The part of an environment that ``make_policy`` needs; a wrapper has it if its ``unwrapped`` is one of this package."""
 
     @property
     def unwrapped(self) -> Any:
@@ -26,13 +26,13 @@ class HasSwarm(Protocol):
 class EnvPolicy:
     """Maps the observations of an environment to the actions that its ``step`` takes.
 
-    Called with what the environment returns: with a dictionary by agent (PettingZoo, RLlib) it gives a dictionary for
-    the same agents, one at a time as in an AEC loop or all at once; with an array of shape (world, vehicle, entry)
-    (``vector_env``), (row, entry) (``SwarmVecEnv``) or (entry,) (``SoloEnv``) an array of actions of that shape.
+    Call it with what the environment returns. A dictionary by agent (PettingZoo, RLlib) gives a dictionary for the same
+    agents, one at a time as in an AEC loop or all at once. An array of shape (world, vehicle, entry) (``vector_env``),
+    (row, entry) (``SwarmVecEnv``) or (entry,) (``SoloEnv``) gives an array of actions of that shape.
 
-    It follows the environment's clock. When an episode begins, the policy forgets the one before by itself. A second
-    call at the same time changes no memory, and a policy with a memory refuses a call after a decision was left out.
-    A vehicle whose observation is not given has perceived what the environment observes for it.
+    It follows the environment's clock: when an episode begins, it clears its memory. A second call at the same time
+    does not change the memory, and a policy with a memory refuses a call after a skipped decision. Vehicles without a
+    given observation use the environment's own.
 
     Args:
         policy: made for the environment's scenario and worlds.
@@ -43,15 +43,14 @@ class EnvPolicy:
     def __init__(self, policy: Policy, swarm: Swarm, agents: Sequence[str] = ()) -> None:
         self.policy, self._swarm = policy, swarm
         self._index = {agent: i for i, agent in enumerate(agents)}
-        self._now: tuple[bytes, ...] = ()
-        """Time and episode of every world at the latest call."""
+        self._now: tuple[bytes, ...] = ()  # time and episode of every world at the latest call
         self._before: Mapping[str, NDArray[Any]] | None = None
-        """The policy before it heard of this time, where not all observations were given at once."""
+        """The policy's state before this time, where not all observations were given at once."""
         self._flat = self._actions = np.zeros(0, np.float32)
-        """What all vehicles perceive now, and their actions, a row each."""
+        """Percepts of all vehicles at this time and their actions, a row each."""
 
     def reset(self, seed: int | None = None) -> None:
-        """Forget the past; never needed. A seed is that of the policy's own random numbers in the next episode."""
+        """Clear the memory; never required. A seed is that of the policy's random numbers in the next episode."""
         self.policy.reset(seed)
         self._now = ()
 
@@ -60,11 +59,10 @@ class EnvPolicy:
     @overload
     def __call__(self, observations: ArrayLike) -> Float32: ...
     def __call__(self, observations: Mapping[str, Any] | ArrayLike) -> dict[str, Float32] | Float32:
-        """The actions for these observations.
+        """Actions for these observations.
 
-        Raises:
-            PolicyError: there is no such agent; observations have another shape than the environment's; or the policy
-                has a memory and a decision was left out.
+        Raises PolicyError if an agent is unknown, observations have another shape than the environment's, or the policy
+        has a memory and a decision was skipped.
         """
         if isinstance(observations, Mapping):
             return self._by_agent(observations)
@@ -117,8 +115,7 @@ class EnvPolicy:
 def environment(target: HasSwarm, name: str) -> tuple[Scenario, Swarm, Sequence[str]]:
     """Scenario, simulation and agents of an environment below all wrappers, for the policy of that name.
 
-    Raises:
-        PolicyError: it is no environment of ours, or does not observe positions.
+    Raises PolicyError if it is not an environment of this package or does not observe positions.
     """
     env: Any = getattr(target, "unwrapped", None)
     swarm = getattr(env, "swarm", None)

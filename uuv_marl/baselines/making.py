@@ -1,8 +1,8 @@
-"""``make``: a policy with its parameters, its base controller and its safety filter, for a scenario or environment."""
+"""``make_policy``: policies with parameters, base controller and safety filter, for a scenario or an environment."""
 
 import inspect
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, overload
 
 from uuv_marl.baselines.env_policy import EnvPolicy, HasSwarm, environment
@@ -12,7 +12,7 @@ from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.names import parse_name
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.registry import POLICIES, PolicyType, is_trained, policy_class
-from uuv_marl.baselines.requirements import inner_loop_nms, resolved_channels
+from uuv_marl.baselines.requirements import PolicyRequirements, inner_loop_nms, resolved_channels
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
 from uuv_marl.errors import ScenarioError, hint
@@ -20,28 +20,30 @@ from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.scenario.overrides import plain
 
 
-def uses_identity(name: str) -> bool:
-    """Whether the policy of that name acts by a vehicle's index, which no vehicle perceives."""
+def policy_requirements(name: str) -> PolicyRequirements:
+    """Requirements of a policy by name; ``identity`` is resolved to whether it uses a vehicle's index."""
     policy_type = policy_class(name)
+    required, identity = policy_type.requirements, policy_type.requirements.identity
     if isinstance(policy_type, Trained):
         base = policy_type.checkpoint.card.base_controller
-        return bool(base) and uses_identity(base)
-    identity = policy_type.identity
-    return bool(_value(parse_name(name).parameters.get(identity, "false"))) if isinstance(identity, str) else identity
+        identity = bool(base) and policy_requirements(base).identity
+    elif isinstance(identity, str):
+        identity = bool(_value(parse_name(name).parameters.get(identity, "false")))
+    return required._replace(identity=identity)
 
 
 def with_policy_requirements(name: str, scenario: Scenario) -> Scenario:
     """The scenario with exactly the channels, the yaw damping and the decision period that a policy requires.
 
-    Where the scenario fixes damping and period for all policies (``timing.fixed``), only with the channels, unless the
-    name has ``own_clock=true``. If the scenario has ``modem``, a policy that requires ``link`` gets ``modem`` instead,
-    with two exceptions: one that requires both, and a trained policy, which knows only the channels of its training.
+    With ``timing.fixed``, the scenario's damping and period stay, unless the name has ``own_clock=true``. If the
+    scenario has ``modem``, it replaces the channel ``link``, except for policies that require both and for trained
+    policies, which use the channels of their training.
     """
-    return with_requirements(name, policy_class(name), scenario)
+    return with_requirements(name, policy_class(name).requirements, scenario)
 
 
-def with_requirements(name: str, required: Any, scenario: Scenario) -> Scenario:
-    """``with_policy_requirements`` for a policy of that name, by its requirements (``PolicyRequirements``)."""
+def with_requirements(name: str, required: PolicyRequirements, scenario: Scenario) -> Scenario:
+    """``with_policy_requirements`` for a policy with known requirements."""
     timing, channels = scenario.timing, required.channels
     changes: dict[str, object] = {
         "sonar.channels": list(channels) if is_trained(name) else resolved_channels(scenario, channels)
@@ -59,19 +61,21 @@ def with_requirements(name: str, required: Any, scenario: Scenario) -> Scenario:
 
 
 @overload
-def make(name: str, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
+def make_policy(name: str, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
 @overload
-def make(name: str, target: HasSwarm, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
-def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **parameters: object) -> Policy | EnvPolicy:
-    """A policy by name.
+def make_policy(name: str, target: HasSwarm, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
+def make_policy(
+    name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **parameters: object
+) -> Policy | EnvPolicy:
+    """Make a policy by name.
 
     Args:
         name: one of ``POLICIES``, the path of a checkpoint (``runs/starter/best``), or ``module:Class``; parameters and
             gains may follow, as in ``bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle``; ``safety_filter=true``
-            puts the policy inside the safety filter.
-        target: a scenario, for a policy that maps ``Percept`` to actions (``Policy``); or one of our environments,
-            wrapped or not, for a policy that maps its observations to its actions (``EnvPolicy``).
-        num_worlds: worlds stepped together; an environment has its own number.
+            adds the safety filter.
+        target: a scenario, for a policy that maps ``Percept`` to actions (``Policy``); or an environment of this
+            package, wrapped or not, for a policy that maps its observations to its actions (``EnvPolicy``).
+        num_worlds: number of parallel worlds; an environment has its own.
         parameters: keyword arguments of the policy, such as ``gains``, or single gains by name.
 
     Raises:
@@ -79,74 +83,72 @@ def make(name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **paramete
             (``with_policy_requirements``).
     """
     if isinstance(target, Scenario):
-        return _with_filter(name, target, num_worlds, parameters)
+        return _made(name, target, num_worlds, parameters)
     scenario, swarm, agents = environment(target, name)
-    return EnvPolicy(_with_filter(name, scenario, swarm.num_worlds, parameters), swarm, agents)
+    return EnvPolicy(_made(name, scenario, swarm.num_worlds, parameters), swarm, agents)
 
 
-def _with_filter(name: str, scenario: Scenario, num_worlds: int, parameters: dict[str, object]) -> Policy:
-    """The policy with these parameters, inside the safety filter where its name says so."""
+def _made(name: str, scenario: Scenario, num_worlds: int, parameters: Mapping[str, object]) -> Policy:
+    """The policy of a type with these parameters, its card's base controller, and the safety filter if named."""
     parsed, policy_type = parse_name(name), policy_class(name)
     values = {**parsed.parameters, **parameters}
     barrier = values.pop("barrier", GUARD) if parsed.safety_filter else GUARD
     if not isinstance(barrier, Barrier):
         raise PolicyError(
             f"policy {name!r}: barrier must be a uuv_marl.baselines.safety.Barrier, got {barrier!r}; "
-            "give it to make(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
+            "give it to make_policy(name, scenario, barrier=Barrier(obstacle_m=8.0)), not in the name"
         )
-    policy = _without_filter(name, policy_type, scenario, num_worlds, values)
+    policy = _with_parameters(name, policy_type, scenario, num_worlds, values)
+    if isinstance(policy_type, Trained):
+        policy = compose(policy, policy_type.checkpoint.card)
+    policy.name = name
     return Guarded(scenario, num_worlds, inner=policy, barrier=barrier) if parsed.safety_filter else policy
 
 
-def _without_filter(
-    name: str, policy_type: PolicyType, scenario: Scenario, num_worlds: int, parameters: dict[str, object]
+def compose(network: Policy, card: Card) -> Policy:
+    """A network with the base controller and the safety filter of its card.
+
+    Args:
+        network: the network's policy, or its substitute in training.
+        card: the training's card.
+
+    Raises:
+        PolicyError: the base controller is unknown, or the scenario lacks its requirements.
+    """
+    scenario, num_worlds = network.scenario, network.num_worlds
+    if card.base_controller:
+        check_base_controller(card.base_controller)
+        base = _made(card.base_controller, scenario, num_worlds, {})
+        network = ResidualPolicy(scenario, num_worlds, base=base, inner=network)
+    return Guarded(scenario, num_worlds, inner=network) if card.filter else network
+
+
+def check_base_controller(name: str) -> None:
+    """Raise PolicyError unless the name is a shipped controller's, since checkpoints must not run other code."""
+    plain = name.partition(",")[0]
+    if isinstance(POLICIES.get(plain), Trained) or ":" in plain or is_checkpoint(plain):
+        controllers = ", ".join(known for known, type_ in POLICIES.items() if not isinstance(type_, Trained))
+        raise PolicyError(f"base_controller must be one of {controllers}, got {name!r}")
+
+
+def _with_parameters(
+    name: str, policy_type: PolicyType, scenario: Scenario, num_worlds: int, parameters: Mapping[str, object]
 ) -> Policy:
-    """The policy with these parameters: keyword arguments of its type, and single gains."""
+    """An instance of a policy type with keyword arguments and single gains."""
     constructor: Any = policy_type
     known = [key for key in inspect.signature(constructor).parameters if key not in ("scenario", "num_worlds")]
     if isinstance(parameters.get("gains"), str):
         raise PolicyError(f"policy {name!r}: gains are written one by one, such as bio_inspired,zeta_n=0.5")
     values = {key: _value(value) for key, value in parameters.items()}
-    policy: Policy = constructor(scenario, num_worlds, **{key: values.pop(key) for key in known if key in values})
-    if isinstance(policy_type, Trained):
-        policy = compose(policy, policy_type.checkpoint.card)
-    policy.name = name
+    policy: Any = constructor(scenario, num_worlds, **{key: values.pop(key) for key in known if key in values})
     if values:
         gains: Any = getattr(policy, "gains", None)
-        changed = {key: _gain(name, key, value, gains, known) for key, value in values.items()}
-        policy.gains = gains._replace(**changed)  # pyright: ignore[reportAttributeAccessIssue] - it has gains
+        policy.gains = gains._replace(**{key: _gain(name, key, value, gains, known) for key, value in values.items()})
     return policy
 
 
-def check_base_controller(name: str) -> None:
-    """Raise PolicyError unless the name is a shipped controller's: a checkpoint runs what it names."""
-    plain = name.partition(",")[0]
-    if isinstance(POLICIES.get(plain), Trained) or ":" in plain or is_checkpoint(plain):
-        controllers = ", ".join(known for known, kind in POLICIES.items() if not isinstance(kind, Trained))
-        raise PolicyError(f"base_controller must be one of {controllers}, got {name!r}")
-
-
-def compose(network: Policy, card: Card) -> Policy:
-    """A network with its card's base controller, to whose actions its own are added, and safety filter.
-
-    Args:
-        network: the network's policy, or what takes its place in training.
-        card: of the training.
-
-    Raises:
-        PolicyError: there is no such controller, or the scenario lacks its requirements.
-    """
-    scenario, num_worlds = network.scenario, network.num_worlds
-    if card.base_controller:
-        check_base_controller(card.base_controller)
-        network = ResidualPolicy(
-            scenario, num_worlds, base=make(card.base_controller, scenario, num_worlds), inner=network
-        )
-    return Guarded(scenario, num_worlds, inner=network) if card.filter else network
-
-
 def _gain(name: str, key: str, value: object, gains: Any, known: Sequence[str]) -> object:
-    """A gain's value. Raises PolicyError unless the policy has that gain and the value is a finite number."""
+    """The value of a gain. Raises PolicyError if the policy has no such gain or the value is not a finite number."""
     fields: tuple[str, ...] = getattr(gains, "_fields", ())
     if key not in fields:
         names = [*known, *fields]
@@ -160,7 +162,7 @@ def _gain(name: str, key: str, value: object, gains: Any, known: Sequence[str]) 
 
 
 def _value(written: object) -> object:
-    """What a text stands for: a number, true or false, or itself. Other values stay as they are."""
+    """The number or truth value that a text stands for; other texts and values stay as they are."""
     if not isinstance(written, str):
         return written
     if written in ("true", "false"):

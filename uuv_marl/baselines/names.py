@@ -1,33 +1,31 @@
-"""What the name of a policy says: ``NAME[,key=value ...]``."""
+"""Grammar of policy names: ``NAME[,key=value ...]``."""
 
 from typing import NamedTuple
 
 from uuv_marl.errors import PolicyError
 from uuv_marl.paths import user_path
 
-SAFETY_FILTER, OWN_CLOCK = "safety_filter", "own_clock"
-"""Options that every policy takes, each ``true`` or ``false``."""
+SAFETY_FILTER, OWN_CLOCK = "safety_filter", "own_clock"  # options of every policy, each ``true`` or ``false``
 
 
 class PolicyName(NamedTuple):
-    """The parts of a policy's name."""
+    """Parts of a policy's name."""
 
     plain: str
     """One of ``POLICIES``, the path of a checkpoint, or ``module:Class``."""
     parameters: dict[str, str]
-    """Values by parameter or gain, as the user wrote them."""
+    """Values by parameter or gain, as text."""
     safety_filter: bool
     """Whether the policy acts inside the safety filter."""
     own_clock: bool
-    """Whether it runs with the decision period and the yaw damping that it requires where the scenario fixes others
-    for all (``timing.fixed``); one that requires no period decides at every control step."""
+    """Whether it runs with its own decision period and yaw damping on a scenario that fixes them (``timing.fixed``); a
+    policy without a required period then decides at every control step."""
 
 
 def parse_name(name: str) -> PolicyName:
-    """The parts of a name such as ``bio_inspired,zeta_n=0.5,safety_filter=true``.
+    """Parts of a name such as ``bio_inspired,zeta_n=0.5,safety_filter=true``.
 
-    Raises:
-        PolicyError: a part is not ``key=value``, or an option is neither true nor false.
+    Raises PolicyError if a part is not ``key=value`` or an option is neither true nor false.
     """
     plain, *pairs = [name] if user_path(name).exists() else name.split(",")
     if (wrong := next((pair for pair in pairs if not all(pair.partition("="))), None)) is not None:

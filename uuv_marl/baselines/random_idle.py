@@ -1,4 +1,4 @@
-"""Floors that every other policy must beat: random actions, and no actions."""
+"""Baselines that every other policy must beat: random actions, and no actions."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -23,10 +23,10 @@ class RandomMemory(NamedTuple):
 
 
 class Random(Policy):
-    """A new force, uniform on the disc of possible ones, for every vehicle at every decision.
+    """A new force, uniform on the unit disc, for every vehicle at every decision.
 
-    An episode's stream starts from its seed, or from that of an earlier ``reset(seed)``; never the stream that the
-    world itself draws from.
+    An episode's random stream starts from its seed, or from that of an earlier ``reset(seed)``; it differs from the
+    stream of the world itself.
     """
 
     Memory: ClassVar[type[Any] | None] = RandomMemory
@@ -36,7 +36,7 @@ class Random(Policy):
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
 
     def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
-        """Forget the past of these worlds; with a seed, their next episodes draw from it."""
+        """Clear the memory of these worlds; a seed is that of their next episodes."""
         super().reset(seed, worlds)
         chosen = list(range(self.num_worlds) if worlds is None else worlds)
         for w, own in zip(chosen, world_seeds(seed, chosen), strict=True):
@@ -64,7 +64,7 @@ class Random(Policy):
         return self.memory.force.copy()
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """A copy of all that later decisions depend on, random streams included."""
+        """A copy of all state that later decisions depend on, random streams included."""
         return super().snapshot() | {"streams": packed(self._rngs)}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
@@ -81,7 +81,7 @@ def _stream(seed: int) -> np.random.Generator:
 
 
 class Idle(Policy):
-    """No force at all."""
+    """No force."""
 
     def decide(self, percept: Percept) -> Float32:
         """Zeros of shape (world, vehicle, 2)."""

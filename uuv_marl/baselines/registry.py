@@ -10,7 +10,7 @@ from uuv_marl.baselines.comparators.oracle import Oracle
 from uuv_marl.baselines.comparators.orca import OrcaInformed
 from uuv_marl.baselines.comparators.proportional import ProportionalTracking
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
-from uuv_marl.baselines.learned.trained import Trained, shipped
+from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.names import parse_name
 from uuv_marl.baselines.paper.bio_inspired import BioInspired, BioInspiredPlus
 from uuv_marl.baselines.paper.sdc import Sdc
@@ -23,8 +23,18 @@ from uuv_marl.baselines.scout.seeker import NearestTarget
 from uuv_marl.errors import hint
 from uuv_marl.modules import named_object
 
-PolicyType = type[Policy] | Trained
-"""What makes a policy when it is called with a scenario, and states the policy's requirements."""
+PolicyType = type[Policy] | Trained  # called with a scenario, it returns a policy; ``requirements`` are the policy's
+
+_NETWORKS = {
+    "mappo": "Trained by MAPPO on random_field, end to end.",
+    "mappo_hard_water": "Trained by MAPPO on hard_water and its hard tier, end to end.",
+    "mappo_two_swarms": "Trained by MAPPO on two_swarms, end to end.",
+    "mappo_few_informed": "Imitation of leader_follower, then MAPPO on few_informed.",
+    "mappo_silent_targets": "Trained by MAPPO on silent_targets, end to end.",
+    "mappo_all": "One network, trained by MAPPO on random_field, hard_water and two_swarms.",
+    "ppo": "Trained by Stable-Baselines3's PPO on short random fields, end to end.",
+}
+"""Docstrings of the networks in ``uuv_marl/baselines/weights``."""
 
 POLICIES: dict[str, PolicyType] = {
     "bio_inspired": BioInspired,
@@ -43,13 +53,7 @@ POLICIES: dict[str, PolicyType] = {
     "proportional_tracking": ProportionalTracking,
     "oracle": Oracle,
     "tangent_bug": TangentBug,
-    "mappo": shipped("mappo", "Trained by MAPPO on random_field, end to end."),
-    "mappo_hard_water": shipped("mappo_hard_water", "Trained by MAPPO on hard_water and its hard tier, end to end."),
-    "mappo_two_swarms": shipped("mappo_two_swarms", "Trained by MAPPO on two_swarms, end to end."),
-    "mappo_few_informed": shipped("mappo_few_informed", "Imitation of leader_follower, then MAPPO on few_informed."),
-    "mappo_silent_targets": shipped("mappo_silent_targets", "Trained by MAPPO on silent_targets, end to end."),
-    "mappo_all": shipped("mappo_all", "One network, trained by MAPPO on random_field, hard_water and two_swarms."),
-    "ppo": shipped("ppo", "Trained by Stable-Baselines3's PPO on short random fields, end to end."),
+    **{name: Trained(name, name, doc) for name, doc in _NETWORKS.items()},
     "random": Random,
     "idle": Idle,
 }
@@ -57,15 +61,11 @@ POLICIES: dict[str, PolicyType] = {
 
 
 def policy_class(name: str) -> PolicyType:
-    """The type of a policy by its name (``uuv_marl.baselines.names``).
-
-    Raises:
-        PolicyError: no policy has that name; the message gives the most similar one.
-    """
+    """The type of a policy by its name (``uuv_marl.baselines.names``). Raises PolicyError if the name is unknown."""
     plain = parse_name(name).plain
     if plain not in POLICIES and is_checkpoint(plain):
         trained = Trained(plain, plain)
-        trained.checkpoint  # noqa: B018 - refused now, not in the middle of a benchmark
+        trained.checkpoint  # noqa: B018 - raises now, not in the middle of a benchmark
         return trained
     if ":" in plain:
         return _imported(plain)
@@ -88,6 +88,6 @@ def _imported(name: str) -> type[Policy]:
 
 
 def is_trained(name: str) -> bool:
-    """Whether a name is that of a trained policy: one that ships, or the path of a checkpoint, which may be gone."""
+    """Whether a name is a trained policy's: one that ships, or the path of a checkpoint, which need not exist."""
     plain = parse_name(name).plain
     return isinstance(POLICIES[plain], Trained) if plain in POLICIES else not re.fullmatch(r"[\w.]+:\w+", plain)

@@ -1,66 +1,65 @@
-"""What a policy declares that it needs beyond the percept, and what of it a scenario grants: channels, loop, clock."""
+"""Requirements of policies beyond sonar and navigation, and their check against a scenario."""
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from uuv_marl.errors import PolicyError
 from uuv_marl.scenario import Scenario
 
+FULL_TORQUE_NM = 3000.0
+"""Full yaw torque of the paper's vehicle [N m], for which hand-made controllers state their yaw damping."""
 
-def inner_loop_nms(declared_nms: float, full_torque_nm: float, scenario: Scenario) -> float:
-    """The inner loop that a policy gets on a scenario's vehicle [N m s]: the declared one, scaled with full torque.
 
-    So on every vehicle the loop takes all torque at the same yaw rate. But it is no stiffer than a loop that stops a
-    yaw rate within one control hold. For a vehicle with a rudder the loop is 0.
+class PolicyRequirements(NamedTuple):
+    """What a policy requires of a scenario, and what its output means."""
 
-    Args:
-        declared_nms: the policy's ``yaw_damping_nms``.
-        full_torque_nm: full torque of the vehicle for which the policy declares the loop [N m].
-        scenario: gives the vehicle.
+    channels: Sequence[str] = ()
+    """Channels beyond the percept, of ``uuv_marl.percept.CHANNELS``. ``modem`` can replace ``link``: then the link's
+    fields start where ``Policy.at`` says, and ``percept["link_velocity"]`` does not exist."""
+    yaw_damping_nms: float = 0.0
+    """Yaw damping of the inner loop [N m s] on a vehicle of ``full_torque_nm``; see ``inner_loop_nms``."""
+    full_torque_nm: float = FULL_TORQUE_NM
+    """Full torque of the vehicle for which the policy states ``yaw_damping_nms`` [N m]."""
+    decision_period_s: float | None = None
+    """Decision period [s]; None if the policy works with any."""
+    identity: bool | str = False
+    """Whether it uses a vehicle's index, which no percept holds; or the name of the parameter that makes it do so."""
+    outputs_force: bool = False
+    """Whether ``decide`` returns desired forces. For a vehicle with a rudder they are then turned into thrust and
+    rudder (``baselines.rudder``); for other vehicles they are actions already."""
+
+
+def inner_loop_nms(required_nms: float, full_torque_nm: float, scenario: Scenario) -> float:
+    """Yaw damping [N m s] for a policy on a scenario's vehicle: the required one, scaled with full torque.
+
+    The loop then saturates at the same yaw rate on every vehicle. It is at most as stiff as a loop that stops a yaw
+    rate within one control step, and 0 for a vehicle with a rudder.
     """
     actuators = scenario.actuators
     if actuators.kind == "rudder":
         return 0.0
-    alike = declared_nms * (actuators.max_torque_nm / full_torque_nm)
-    return min(alike, scenario.vehicle.inertia[3] / scenario.timing.control_step_s)
+    scaled = required_nms * (actuators.max_torque_nm / full_torque_nm)
+    return min(scaled, scenario.vehicle.inertia[3] / scenario.timing.control_step_s)
 
 
-def resolved_channels(scenario: Scenario, declared: Sequence[str]) -> list[str]:
-    """What a hand-made policy gets that declares these channels: ``modem`` for ``link`` where the scenario has it."""
-    link_channel = "modem" if "modem" in scenario.sonar.channels and "modem" not in declared else "link"
-    return [link_channel if channel == "link" else channel for channel in declared]
+def resolved_channels(scenario: Scenario, required: Sequence[str]) -> list[str]:
+    """Channels for a hand-made policy: ``modem`` in place of ``link`` where the scenario has ``modem``."""
+    link_channel = "modem" if "modem" in scenario.sonar.channels and "modem" not in required else "link"
+    return [link_channel if channel == "link" else channel for channel in required]
 
 
-class PolicyRequirements(NamedTuple):
-    """What a policy needs, by the names that ``Policy`` has for it."""
-
-    channels: Sequence[str]
-    yaw_damping_nms: float
-    full_torque_nm: float
-    decision_period_s: float | None
-
-
-def check_requirements(name: str, policy: Any, scenario: Scenario) -> None:
-    """Refuse a scenario that does not grant what a policy declares: channels, an inner loop, a clock.
-
-    Args:
-        name: the policy's name in the message.
-        policy: a policy, its class, or what else has what ``Declared`` has.
-        scenario: the scenario on which the policy should run.
-
-    Raises:
-        PolicyError: the scenario lacks channels, the inner loop or the clock; the message names them and the remedy.
-    """
+def check_requirements(name: str, required: PolicyRequirements, scenario: Scenario) -> None:
+    """Raise PolicyError, with the remedy, if the scenario lacks a policy's channels, inner loop or decision period."""
     has = scenario.sonar.channels
-    missing = [name for name in policy.channels if name not in has and not (name == "link" and "modem" in has)]
+    missing = [name for name in required.channels if name not in has and not (name == "link" and "modem" in has)]
     needs: list[str] = []
     if missing:
         needs.append(f"the channel{'s' if len(missing) > 1 else ''} {' and '.join(missing)} (sonar.channels)")
-    damping = inner_loop_nms(policy.yaw_damping_nms, policy.full_torque_nm, scenario)
+    damping = inner_loop_nms(required.yaw_damping_nms, required.full_torque_nm, scenario)
     if not scenario.timing.fixed and not math.isclose(scenario.actuators.yaw_damping_nms, damping, rel_tol=1e-9):
         needs.append(f"a yaw damping of {damping:g} N m s (actuators.yaw_damping_nms)")
-    period = policy.decision_period_s
+    period = required.decision_period_s
     if period and not math.isclose(scenario.timing.decision_period_s, period, rel_tol=1e-9):
         needs.append(f"a decision every {period:g} s (timing.decision_period_s)")
     if needs:

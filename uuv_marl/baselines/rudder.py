@@ -1,4 +1,4 @@
-"""From a wished force to thrust and rudder, for hulls that turn by the flow past a fin."""
+"""Desired forces as thrust and rudder, for hulls that are steered by the flow past a fin."""
 
 import math
 from typing import NamedTuple
@@ -15,25 +15,19 @@ STEERAGE = 0.5
 
 
 class Rudder(NamedTuple):
-    """Steering data of a vehicle with a rudder. SI units."""
+    """Steering data of a vehicle with a rudder, in SI units."""
 
-    sideways: float
-    """Newtons to starboard that an action's second number stands for: full torque over the lever arm."""
-    ahead: float
-    """Full thrust ahead."""
-    astern: float
-    """Full thrust astern over that ahead [1]."""
+    sideways: float  # sideways force at full second action: full torque over the lever arm [N]
+    ahead: float  # full thrust ahead [N]
+    astern: float  # full thrust astern over that ahead [1]
     lever_arm: float
-    full_moment: float
-    """Yaw moment of the rudder at its limit, over the squared flow [kg]."""
-    steerage: float
-    """Speed below which the rudder has little flow."""
-    holding_thrust: float
-    """Thrust that holds that speed, over full thrust [1]."""
+    full_moment: float  # yaw moment of the rudder at its limit, over the squared flow [kg]
+    steerage: float  # speed below which the rudder has little flow [m/s]
+    holding_thrust: float  # thrust that holds that speed, over full thrust [1]
 
     @staticmethod
     def of(scenario: Scenario) -> "Rudder | None":
-        """The rudder of a scenario's vehicle; None if it has none."""
+        """Data of a scenario's vehicle; None without a rudder."""
         hull, actuators = scenario.vehicle, scenario.actuators
         if actuators.kind != "rudder":
             return None
@@ -51,14 +45,13 @@ class Rudder(NamedTuple):
 
 @compiled
 def steer_by_rudder(flat: Float32, at: Starts, fin: Rudder, action: Float32) -> None:
-    """Turn wished forces into thrust and rudder.
+    """Turn desired forces into thrust and rudder, in place.
 
-    The wished yaw moment is the force's part to starboard by the lever arm (Eq. 22). Of a force that points astern the
-    whole counts: the bow goes round to it, since the vehicle can't follow it backwards. The rudder's angle is that
-    moment over what the rudder gives at its limit in the present flow, which is taken as no slower than steerage way.
-    Thrust is the force's part ahead, or astern as far as there is thrust astern; below steerage way it is no less than
-    what holds that speed, as a vehicle without flow would not turn at all. ``action`` holds forces as shares of full
-    thrust and torque, and is overwritten by shares of full thrust and of the rudder's limit.
+    The desired yaw moment is the force's component to starboard times the lever arm (Eq. 22). A force astern counts in
+    full: the bow turns to it, since the vehicle can't follow it backwards. The rudder's angle is that moment over the
+    rudder's largest in the present flow, taken as at least steerage way. Thrust is the force's component ahead, limited
+    astern; below steerage way it is at least what holds that speed, as a vehicle without flow would not turn at all.
+    ``action``, shape (world, vehicle, 2), holds shares of full thrust and torque, and then of full thrust and rudder.
     """
     see = fields(flat, at)
     for w in range(action.shape[0]):

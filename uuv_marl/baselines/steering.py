@@ -1,4 +1,4 @@
-"""From a wished velocity to an action, and back; for all policies that compute with velocities."""
+"""Actions for desired velocities, and the steady velocities of actions."""
 
 import math
 
@@ -8,26 +8,25 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Float32
 
 _SHARE = 1.5
-"""Of a velocity error, what a decision period's force makes good at most [1]. Above 2 it would grow. Tried by hand: 1
-and less keep swarms less well apart, since the surge follows at once, but the sway only as the bow turns."""
-_MOST_RATE = 8.0
-"""Largest share of a velocity error that is made good in a second [1/s]; found by hand, too."""
+"""Largest share of a velocity error that one decision period corrects [1]; above 2 errors would grow. Found by hand: at
+1 and below, swarms keep less distance, since surge follows at once, but sway only as the bow turns."""
+_MOST_RATE = 8.0  # largest share of a velocity error that is corrected in a second [1/s]; found by hand, too
 
 
 def velocity_gain(scenario: Scenario) -> float:
-    """Force per velocity error [N s/m] with which ``steer`` follows: quick, and stable at the decision period."""
+    """Force per velocity error [N s/m] of ``steer``: fast, and stable at the decision period."""
     rate = min(_SHARE / scenario.timing.decision_period_s, _MOST_RATE)
     return rate * scenario.vehicle.inertia[0]
 
 
 @compiled
 def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limits, out: Float32) -> None:
-    """The action that takes a vehicle towards a wished velocity: resistance made up for, error made good. Eq. 22.
+    """Write the action that takes a vehicle to a desired velocity w [m/s]: resistance and error compensated. Eq. 22.
 
-    The force lies in the horizontal plane. Its forward part becomes thrust, ahead or astern; its sideways part turns
-    the bow to it by the lever arm, since the vehicle can't push sideways. With a rudder the sideways part follows the
-    angle between the bow and the wished velocity alone, by its sine: such a hull slips sideways in every turn, and
-    making that good would turn it back. w is the wished velocity [m/s].
+    The forward component of the force becomes thrust, ahead or astern; its sideways component turns the bow by the
+    lever arm, since the vehicle can't push sideways. With a rudder the sideways component follows the sine of the angle
+    between bow and desired velocity alone: such a hull slips sideways in every turn, and correcting that would turn it
+    back.
     """
     drag = surge_resistance(math.hypot(w_x, w_y), limits)
     f_x, f_y = drag * w_x + gain * (w_x - u), drag * w_y + gain * (w_y - v)
@@ -39,7 +38,7 @@ def steer(w_x: float, w_y: float, u: float, v: float, gain: float, limits: Limit
 
 @compiled
 def steady_velocity(a_x: float, a_y: float, limits: Limits) -> tuple[float, float]:
-    """The velocity [m/s] at which the resistance equals an action's force. Eq. 22 backwards."""
+    """The velocity [m/s] at which resistance equals an action's force. Inverse of Eq. 22."""
     f_x, f_y = a_x * limits.max_force, a_y * limits.max_torque / limits.lever_arm
     force = math.hypot(f_x, f_y)
     if force == 0.0:
@@ -53,5 +52,5 @@ def steady_velocity(a_x: float, a_y: float, limits: Limits) -> tuple[float, floa
 
 @compiled
 def full_speed(limits: Limits) -> float:
-    """The speed [m/s] at which the resistance equals full thrust."""
+    """The speed [m/s] at which resistance equals full thrust."""
     return steady_velocity(1.0, 0.0, limits)[0]

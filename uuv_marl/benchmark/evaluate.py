@@ -1,14 +1,15 @@
 """Run a policy on a scenario over seeds."""
 
 import math
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 
-from uuv_marl.baselines import POLICIES, make
+from uuv_marl.baselines import POLICIES, make_policy
 from uuv_marl.benchmark.metrics import Metrics, MetricsRecorder
+from uuv_marl.envs.changes import Changes, ScenarioLike, changed
 from uuv_marl.errors import DivergenceError, PolicyError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import whole_number
@@ -63,7 +64,7 @@ Watch = Callable[[Swarm, Float32 | None], None]
 after the reset. It must not change the arrays, and must copy those that it keeps."""
 
 
-def evaluate(
+def episodes(
     scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch | None = None, /, **parameters: object
 ) -> Iterator[Run | Progress]:
     """Run a policy on a scenario; yields each episode as soon as it ends, with progress in between.
@@ -71,8 +72,8 @@ def evaluate(
     A run depends on its seed alone, not on the other seeds.
 
     Args:
-        scenario: must have the channels and the inner loop of the policy (``uuv_marl.baselines.granted``).
-        policy: the policy's name, see ``uuv_marl.baselines.make``.
+        scenario: must have what the policy requires (``uuv_marl.with_policy_requirements``).
+        policy: the policy's name, see ``uuv_marl.baselines.make_policy``.
         seeds: one seed for each episode.
         watch: called after the reset and after every step.
         parameters: keyword arguments of the policy.
@@ -89,6 +90,33 @@ def evaluate(
                 yield Progress((first + event.share * len(batch)) / len(seeds))
             else:
                 yield event
+
+
+def evaluate(
+    policy: str,
+    scenario: ScenarioLike = "single_obstacle",
+    seeds: Iterable[int] = range(20),
+    **changes: Unpack[Changes],
+) -> list[dict[str, Any]]:
+    """Run a policy on a scenario with the policy's requirements; the metrics of every episode.
+
+    Args:
+        policy: a name, the path of a checkpoint or ``module:Class``, see ``uuv_marl.make_policy``.
+        scenario: a name, a TOML file or a ``Scenario``.
+        seeds: one seed for each episode.
+        changes: ``num_vehicles``, ``decision_period``, ``task`` and ``overrides``, as for ``uuv_marl.parallel_env``.
+
+    Returns:
+        A dictionary for each seed, in their order: ``seed`` and the metrics that docs/benchmark.md defines.
+
+    Raises:
+        ScenarioError: a change contradicts a requirement of the policy.
+        DivergenceError: the integration step is too long for a vehicle.
+    """
+    given = [*seeds]
+    with blaming(policy):
+        runs = [run for run in episodes(changed(scenario, policy, **changes), policy, given) if isinstance(run, Run)]
+    return [{"seed": run.seed, **run.metrics} for run in sorted(runs, key=lambda run: given.index(run.seed))]
 
 
 @contextmanager
@@ -111,7 +139,7 @@ def _batch(
 ) -> Iterator[Run | Progress]:
     """Episodes of seeds that are stepped together."""
     swarm = Swarm(scenario, len(seeds))
-    actor = make(policy, scenario, len(seeds), **parameters)
+    actor = make_policy(policy, scenario, len(seeds), **parameters)
     percept = swarm.reset(list(seeds))
     actor.reset(list(seeds))
     recorder = MetricsRecorder(swarm)

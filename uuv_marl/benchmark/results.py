@@ -22,15 +22,15 @@ from typing_extensions import TypedDict
 from uuv_marl import __version__
 from uuv_marl.atomic import replacing, write_text, writing
 from uuv_marl.baselines.learned.trained import Trained
-from uuv_marl.baselines.making import uses_identity
-from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.making import policy_requirements
 from uuv_marl.baselines.registry import policy_class
-from uuv_marl.baselines.requirements import PolicyRequirements
+from uuv_marl.baselines.requirements import FULL_TORQUE_NM, PolicyRequirements
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.messages import explain
 from uuv_marl.types import Float32
 
 FILE = "results.json"
@@ -60,7 +60,7 @@ class PolicyInfo(TypedDict):
 
     channels: list[str]
     yaw_damping_nms: float
-    """The policy's inner loop on a vehicle of ``Policy.full_torque_nm``; ``inner_loop_nms`` gives that on another."""
+    """The policy's inner loop on a vehicle of ``FULL_TORQUE_NM``; ``inner_loop_nms`` gives that on another."""
     identity: NotRequired[Literal[True]]
     """Present where the policy uses a vehicle's index."""
     decision_period_s: NotRequired[float]
@@ -94,8 +94,7 @@ def read_content(path: Path, remedy: str = "move it away or give another --outpu
     except OSError as error:
         reason = error.strerror or str(error)
     except ValidationError as error:
-        first = error.errors()[0]
-        reason = f"{'.'.join(map(str, first['loc']))}: {first['msg']}".removeprefix(": ")
+        reason = explain(error, None)
     else:
         unknown = {row.scenario for row in content["runs"]} - set(content["scenarios"])
         unknown |= {row.policy for row in content["runs"]} - set(content["policies"])
@@ -268,12 +267,13 @@ def policy_info(policy: str) -> PolicyInfo:
     else:
         file = inspect.getsourcefile(policy_type)
         source = (_hash(Path(file).read_bytes()) if file else _unknown()) if ":" in policy else None
-    damping = policy_type.yaw_damping_nms * (Policy.full_torque_nm / policy_type.full_torque_nm)
-    known = PolicyInfo(channels=list(policy_type.channels), yaw_damping_nms=damping, source=source)
-    if uses_identity(policy):
+    required = policy_requirements(policy)
+    damping = required.yaw_damping_nms * (FULL_TORQUE_NM / required.full_torque_nm)
+    known = PolicyInfo(channels=list(required.channels), yaw_damping_nms=damping, source=source)
+    if required.identity:
         known["identity"] = True
-    if policy_type.decision_period_s:
-        known["decision_period_s"] = policy_type.decision_period_s
+    if required.decision_period_s:
+        known["decision_period_s"] = required.decision_period_s
     if isinstance(policy_type, Trained):
         known["policy_class"] = policy_type.checkpoint.card.policy_class
     return known
@@ -281,8 +281,8 @@ def policy_info(policy: str) -> PolicyInfo:
 
 def requirements_of(known: PolicyInfo) -> PolicyRequirements:
     """The requirements of a policy in ``results.json``."""
-    every = known.get("decision_period_s")
-    return PolicyRequirements(known["channels"], known["yaw_damping_nms"], Policy.full_torque_nm, every)
+    period = known.get("decision_period_s")
+    return PolicyRequirements(known["channels"], known["yaw_damping_nms"], decision_period_s=period)
 
 
 def source_fingerprint() -> str:

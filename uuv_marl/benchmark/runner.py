@@ -8,7 +8,7 @@ from uuv_marl.atomic import write_text, writing
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.names import OWN_CLOCK, with_option
 from uuv_marl.baselines.registry import is_trained
-from uuv_marl.benchmark.evaluate import Progress, Run, blaming, evaluate
+from uuv_marl.benchmark.evaluate import Progress, Run, blaming, episodes
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import ResultRow, Results
 from uuv_marl.benchmark.tables import Table, markdown_table, scenario_table
@@ -51,7 +51,7 @@ def run_missing(
             done, fresh, share = len(seeds) - len(missing), 0, 0.0
             report(scenario.name, policy, done / len(seeds))
             with blaming(policy):
-                for event in evaluate(with_policy_requirements(policy, scenario), policy, missing, **parameters):
+                for event in episodes(with_policy_requirements(policy, scenario), policy, missing, **parameters):
                     if isinstance(event, Run):
                         results.add(scenario.name, policy, event)
                         fresh += 1

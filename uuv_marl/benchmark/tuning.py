@@ -18,7 +18,7 @@ from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.safety.barrier import Barrier, with_numbers
 from uuv_marl.baselines.scout import seeker
 from uuv_marl.baselines.scout.gains import ScoutGains
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.extras import silenced
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario, load_scenario
@@ -195,7 +195,7 @@ def tune(policy: str, output: UserPath, trials: int, report: Callable[[int, floa
 
     def objective(trial: optuna.Trial) -> float:
         drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.free.items()}
-        runs = [run for run in evaluate(scenario, policy, seeds, **space.parameters(drawn)) if isinstance(run, Run)]
+        runs = [run for run in episodes(scenario, policy, seeds, **space.parameters(drawn)) if isinstance(run, Run)]
         return sum(tuning_cost(run, scenario) for run in runs) / len(runs)
 
     def sampler(seed: int) -> optuna.samplers.BaseSampler:

@@ -59,7 +59,7 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.baselines import POLICIES, make, with_policy_requirements
+        from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.benchmark.tables import terminal_table
@@ -72,7 +72,7 @@ def benchmark(
         names = runner.distinct_names(scenarios, "table")
         policies = list(dict.fromkeys(policy or runner.default_policies(scenarios)))
         for name, loaded in itertools.product(policies, scenarios):
-            make(name, with_policy_requirements(name, loaded))  # raises now, not after hours of other runs
+            make_policy(name, with_policy_requirements(name, loaded))  # raises now, not after hours of other runs
         wanted = range(seeds)
         with working(f"The finished runs are in {output}", alone=output) as bar:
             results = Results(output, scenarios)

@@ -81,14 +81,15 @@ def _vehicles() -> Table:
 
 def _policies() -> Table:
     from uuv_marl.baselines import POLICIES
-    from uuv_marl.baselines.making import uses_identity
+    from uuv_marl.baselines.making import policy_requirements
 
     table = Table("name", "beyond sonar", "yaw damping [N m s]", "decides every [s]", "what")
     for name, policy_type in POLICIES.items():
-        every = f"{policy_type.decision_period_s:g}" if policy_type.decision_period_s else "-"
+        required = policy_requirements(name)
+        every = f"{required.decision_period_s:g}" if required.decision_period_s else "-"
         what = (policy_type.__doc__ or "").strip().partition("\n")[0]  # nothing under python -OO
-        beyond = [*policy_type.channels, *(["identity"] if uses_identity(name) else [])]
-        table.add_row(name, ", ".join(beyond) or "-", f"{policy_type.yaw_damping_nms:g}", every, what)
+        beyond = [*required.channels, *(["identity"] if required.identity else [])]
+        table.add_row(name, ", ".join(beyond) or "-", f"{required.yaw_damping_nms:g}", every, what)
     return table
 
 

@@ -143,7 +143,7 @@ def _simulated(
     name: str, policies: Sequence[str], seed: int, inspect: Sequence[int], overrides: Sequence[str], bar: "Progress"
 ) -> "list[Recording]":
     """An episode of each policy on the same seed; errors of all are raised before the first is simulated."""
-    from uuv_marl.baselines import make, with_policy_requirements
+    from uuv_marl.baselines import make_policy, with_policy_requirements
     from uuv_marl.replay.record import checked, record
     from uuv_marl.scenario import load_scenario
 
@@ -151,7 +151,7 @@ def _simulated(
     scenario = load_scenario(name, overrides=changes_of(overrides))
     checked(inspect, scenario)
     for policy in policies:
-        make(policy, with_policy_requirements(policy, scenario))
+        make_policy(policy, with_policy_requirements(policy, scenario))
     recordings: list[Recording] = []
     for policy in policies:
         report = progress_line(bar, f"{scenario.name}: {policy}")

@@ -3,25 +3,20 @@
 import math
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import Literal, NamedTuple, TypedDict, Unpack, cast
+from typing import NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from uuv_marl.envs.reward import RewardFunction, own_reward
+from uuv_marl.envs.changes import Changes, Reward, ScenarioLike, changed
 from uuv_marl.envs.state import global_state, state_layout
-from uuv_marl.errors import hint
-from uuv_marl.paths import UserPath
-from uuv_marl.scenario import Scenario, ScenarioError, load_scenario
-from uuv_marl.scenario.overrides import override_of
+from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.sim.arguments import SeedLike, whole_number
 from uuv_marl.sim.observation import Observe, observation_layout, observer
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.task import StepReward, Task, checked_reward
+from uuv_marl.tasks.reward import StepReward, from_function
+from uuv_marl.tasks.task import Task
 from uuv_marl.types import Bool, Float32, Float64
-
-ScenarioLike = UserPath | Scenario | Mapping[str, object]
-Reward = Literal["dense", "sparse", "team", "geodesic", "leader"] | RewardFunction
 
 
 class StepResult(NamedTuple):
@@ -42,19 +37,14 @@ class StepResult(NamedTuple):
     """Shape (world,): the arrival of the swarm ends the episode, or all vehicles are lost."""
     world_truncated: Bool
     """Shape (world,): the time limit ends the episode."""
-    term_values: Float64 | None
-    """The reward's terms, shape (term, world, vehicle); None for a user's own reward."""
+    term_values: Float64
+    """The reward's terms, shape (term, world, vehicle); empty for a user's own reward, or if they are not kept."""
     term_names: tuple[str, ...]
-    """Their names."""
 
     @property
     def terms(self) -> Mapping[str, Float64]:
-        """The reward's terms by name; empty for a user's own reward."""
-        return (
-            {}
-            if self.term_values is None or not self.term_values.size
-            else dict(zip(self.term_names, self.term_values, strict=False))
-        )
+        """The reward's terms by name."""
+        return dict(zip(self.term_names, self.term_values, strict=True)) if self.term_values.size else {}
 
     @property
     def over(self) -> Bool:
@@ -69,12 +59,12 @@ class BatchedEnv:
         scenario: what to simulate.
         num_worlds: worlds stepped together.
         reward: ``dense`` (the sum of a vehicle's terms, see the task), ``sparse`` (the same without progress) and
-            ``geodesic`` (progress along the free way) and ``led`` (the informed get the mean) where the task has them,
-            ``team`` (every vehicle gets the mean of ``dense`` over all; a lost vehicle also pays its own loss), or a
-            function from the swarm to an array (world, vehicle).
+            ``geodesic`` (progress along the shortest collision-free path) and ``leader`` (informed vehicles get the
+            mean) where the task has them, ``team`` (every vehicle gets the mean of ``dense``; a lost vehicle also its
+            own loss), or a function from the swarm to an array (world, vehicle).
         max_cycles: decisions after which an episode is truncated, unless the scenario's time limit comes first.
         observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
-        keep_terms: whether steps tell the reward's terms, which takes time in large batches.
+        keep_terms: whether steps return the reward's terms, which takes time in large batches.
     """
 
     def __init__(
@@ -159,7 +149,8 @@ class BatchedEnv:
         observation, step_reward = self._simulated(action, running)
         np.add(self.collisions, swarm.facts.collisions, out=self.collisions, where=running)
         alive = swarm.state.alive
-        reward, world_reward, term_values = self._rewards(before & running[:, None], step_reward)
+        mean = step_reward.total.sum(axis=1) / swarm.num_vehicles  # twice as fast as mean(axis=1), and its bits
+        team = self._reward == "team"
         world_terminated, world_truncated = swarm.endings()
         if self._max_cycles is not None:
             last_tick = self._max_cycles * swarm.scenario.timing.control_steps_per_decision
@@ -167,105 +158,54 @@ class BatchedEnv:
         self.over = world_terminated | world_truncated
         return StepResult(
             observation=observation,
-            reward=reward,
+            reward=self._team(step_reward, mean, before & running[:, None]) if team else step_reward.total,
             terminated=before & (world_terminated[:, None] | ~alive),
             truncated=alive & world_truncated[:, None],
             acting=alive & ~self.over[:, None],
-            world_reward=world_reward,
+            world_reward=mean,
             world_terminated=world_terminated,
             world_truncated=world_truncated,
-            term_values=term_values,
-            term_names=tuple(self.task.terms),
+            term_values=step_reward.terms,
+            term_names=() if callable(self._reward) else tuple(self.task.terms),
         )
 
     def _simulated(self, action: ArrayLike, running: Bool) -> tuple[Float32, StepReward]:
-        """One decision of the worlds that are ``running``; all observations, and what those worlds pay."""
-        swarm, task = self.swarm, self.task
+        """Step the worlds that are ``running``: the observations of all worlds, and the reward of these."""
+        swarm = self.swarm
         observation, observe = observer(swarm.percept, self.layout)
-        step_reward = task.step_reward(task.reward_name, running, keep_terms=self._keep_terms)
-        if step_reward is not None and not swarm.task_fields:
-            threaded = step_reward
-
-            def observe_and_fill(begin: int, end: int) -> None:
-                observe(begin, end)
-                threaded.fill(begin, end)
-
-            swarm.step(action, running, observe_and_fill)
-            return observation, step_reward
-        swarm.step(action, running)
-        observe(0, swarm.num_worlds)
-        if step_reward is None:
-            step_reward = checked_reward(task, running)
+        if callable(self._reward):
+            reward = from_function(self._reward, swarm, running)
         else:
-            step_reward.fill(0, swarm.num_worlds)
-        return observation, step_reward
+            reward = self.task.step_reward(running, keep_terms=self._keep_terms)
+
+        def observe_and_fill(begin: int, end: int) -> None:
+            observe(begin, end)
+            reward.fill(begin, end)
+
+        worlds = (0, swarm.num_worlds)
+        if swarm.task_fields:  # which are written after all worlds are stepped
+            swarm.step(action, running)
+            observe_and_fill(*worlds)
+        elif reward.concurrent:
+            swarm.step(action, running, observe_and_fill)
+        else:
+            swarm.step(action, running, observe)
+            reward.fill(*worlds)
+        return observation, reward
 
     def state(self) -> Float32:
         """The global state of every world, shape (world, entry), see ``uuv_marl.envs.state.state_table``."""
         self.check_reset("state()")
         return global_state(self.swarm, self.state_layout)
 
-    def _rewards(self, before: Bool, step_reward: StepReward) -> tuple[Float64, Float64, Float64 | None]:
-        """Reward per vehicle, per world, and the weighted terms, for those that were there ``before`` the step."""
-        if callable(self._reward):
-            own = own_reward(self._reward, self.swarm, before)
-            return own, own.mean(axis=1), None
-        reward, terms = step_reward.reward, step_reward.terms
-        mean = reward.sum(axis=1) / self.swarm.num_vehicles  # twice as fast as reward.mean(axis=1), and its bits
-        if self._reward == "team":
-            # Who is lost leaves the team's later costs behind, and so bears its own charge whole.
-            loss = terms[tuple(self.task.terms).index("loss")] if "loss" in self.task.terms else 0.0
-            reward = np.where(before, mean[:, None] + loss, 0.0)
-        return reward, mean, terms
+    def _team(self, step_reward: StepReward, mean: Float64, before: Bool) -> Float64:
+        """The team's reward of vehicles that acted, shape (world, vehicle): their mean, and a lost one's own loss.
 
-
-class Changes(TypedDict, total=False):
-    """Arguments of every environment API that change the scenario, explained by ``uuv_marl.parallel_env``."""
-
-    num_vehicles: int | None
-    decision_period: float | None
-    task: str | Mapping[str, object] | None
-    overrides: Mapping[str, object] | None
-
-
-class EnvOptions(Changes, total=False):
-    """Arguments of every environment API beyond the scenario, explained by ``uuv_marl.parallel_env``."""
-
-    max_cycles: int | None
-    reward: Reward
-    observe: Observe
-
-
-_FIELDS = {"num_vehicles": "swarm.num_vehicles", "decision_period": "timing.decision_period_s", "task": "task"}
-"""Fields that arguments stand for."""
-
-
-def changed(scenario: ScenarioLike, **changes: Unpack[Changes]) -> Scenario:
-    """The scenario, changed by the arguments of an environment.
-
-    Args:
-        scenario: a name, a TOML file or a ``Scenario``.
-        changes: ``num_vehicles`` replaces the scenario's number of vehicles, ``decision_period`` the time between
-            decisions [s], ``task`` what is to be done (``mine:Rendezvous``), and ``overrides`` any field, as in
-            ``{"sonar.echo_reports": "surface"}``.
-
-    Raises:
-        TypeError: there is no such argument.
-        ScenarioError: an argument and the override of its field differ.
-    """
-    for name in changes.keys() - Changes.__annotations__.keys():
-        usual = {"max_episode_steps": "max_cycles"}.get(name, name)  # Gymnasium's name
-        near = hint(usual, EnvOptions.__annotations__, 0.6)
-        raise TypeError(f"this environment has no argument {name!r}; {near}Fields of the scenario go into overrides")
-    overrides = changes.get("overrides") or {}
-    if not isinstance(cast(object, overrides), Mapping):
-        return load_scenario(scenario, overrides=overrides)  # which says what overrides must be
-    for name, field in _FIELDS.items():
-        own, other = changes.get(name), override_of(overrides, field)
-        if own is not None and other is not None and own != other:
-            raise ScenarioError(f"{name} = {own} and the override {field} = {other} differ; leave one out")
-    more = {field: changes[name] for name, field in _FIELDS.items() if changes.get(name) is not None}
-    return load_scenario(scenario, overrides={**overrides, **more})
+        A lost vehicle has no share in the team's later costs, so it bears the whole of its loss.
+        """
+        names = [*self.task.terms]
+        loss = step_reward.terms[names.index("loss")] if "loss" in names else 0.0
+        return np.where(before, mean[:, None] + loss, 0.0)
 
 
 def make_batched_env(
@@ -277,6 +217,7 @@ def make_batched_env(
     reward: Reward = "dense",
     observe: Observe = "positions",
     keep_terms: bool = True,
+    for_policy: str | None = None,
     **changes: Unpack[Changes],
 ) -> BatchedEnv:
     """Worlds from the arguments that every environment API takes.
@@ -288,7 +229,8 @@ def make_batched_env(
         max_cycles: decisions after which an episode is truncated; None for the scenario's time limit.
         reward: ``dense``, ``sparse``, ``team``, one of the task's, or a function from the swarm to (world, vehicle).
         observe: ``positions`` or ``closeness``, see ``uuv_marl.sim.observation``.
-        keep_terms: whether steps tell the reward's terms.
+        keep_terms: whether steps return the reward's terms.
+        for_policy: policy whose requirements the scenario gets.
         changes: ``num_vehicles``, ``decision_period`` [s], ``task`` and ``overrides`` of the scenario, see ``changed``.
     """
     (number,) = {*order} - {"scenario"}
@@ -299,7 +241,7 @@ def make_batched_env(
         worlds = whole_number(number, num_worlds, 1)
     except TypeError as error:
         raise TypeError(f"{error}; {remedy}") from None
-    return BatchedEnv(changed(scenario, **changes), worlds, reward, max_cycles, observe, keep_terms)
+    return BatchedEnv(changed(scenario, for_policy, **changes), worlds, reward, max_cycles, observe, keep_terms)
 
 
 def refuse_losses(scenario: Scenario, api: str) -> None:

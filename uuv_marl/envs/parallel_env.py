@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from pettingzoo import AECEnv, ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
 
-from uuv_marl.envs.core import BatchedEnv, Reward, ScenarioLike, StepResult, make_batched_env
+from uuv_marl.envs.changes import Reward, ScenarioLike
+from uuv_marl.envs.core import BatchedEnv, StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
@@ -181,6 +182,7 @@ def parallel_env(
     task: str | Mapping[str, object] | None = None,
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
+    for_policy: str | None = None,
 ) -> SwarmParallelEnv:
     """A PettingZoo parallel environment.
 
@@ -202,11 +204,13 @@ def parallel_env(
         decision_period: time between decisions [s], a multiple of the scenario's control hold; replaces
             ``timing.decision_period_s``. Between decisions the force keeps its direction in the world frame.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
+        for_policy: name of a policy whose requirements the scenario gets after all other changes: its channels, yaw
+            damping and decision period (``uuv_marl.with_policy_requirements``).
     """
     batch = make_batched_env(
         scenario, order=("scenario", "num_vehicles"), max_cycles=max_cycles, reward=reward, observe=observe,
         keep_terms=info_terms, num_vehicles=num_vehicles, decision_period=decision_period, task=task,
-        overrides=overrides,
+        overrides=overrides, for_policy=for_policy,
     )  # fmt: skip
     return SwarmParallelEnv(batch, render_mode, info_terms, render_options)
 

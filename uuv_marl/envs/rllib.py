@@ -49,7 +49,7 @@ class SwarmMultiAgentEnv(MultiAgentEnv):
 
     @property
     def swarm(self) -> Swarm:
-        """The simulation; ``uuv_marl.baselines.make(name, env)`` follows it."""
+        """The simulation; ``uuv_marl.baselines.make_policy(name, env)`` follows it."""
         return self._env.swarm
 
     @property

@@ -8,7 +8,8 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from uuv_marl.envs.core import EnvOptions, ScenarioLike, StepResult, make_batched_env, refuse_losses
+from uuv_marl.envs.changes import EnvOptions, ScenarioLike
+from uuv_marl.envs.core import StepResult, make_batched_env, refuse_losses
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending, succeeded
 from uuv_marl.envs.mixins import EnvMixin
@@ -40,8 +41,8 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         num_worlds: worlds stepped together.
         render_mode: ``rgb_array`` or None; the picture tiles all worlds.
         render_options: as for ``uuv_marl.parallel_env``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period`` and
-            ``overrides``, as for ``uuv_marl.parallel_env``.
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period``,
+            ``overrides`` and ``for_policy``, as for ``uuv_marl.parallel_env``.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012 - SB3's own form
@@ -109,12 +110,7 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         self._renderer.update()
         with rounding():
             reward = result.reward.astype(np.float32).reshape(-1)
-        return (
-            observation.reshape(self.num_envs, -1),
-            reward,
-            np.repeat(over, self._shape[1]),
-            infos,
-        )
+        return (observation.reshape(self.num_envs, -1), reward, np.repeat(over, self._shape[1]), infos)
 
     def _end(self, world: int, result: StepResult, infos: list[dict[str, Any]]) -> None:
         """Write what SB3 wants to know of an ended world into the infos of its rows."""

@@ -1,6 +1,5 @@
 """``SoloEnv``: one learner among vehicles that follow a policy, a plain Gymnasium environment."""
 
-import math
 from typing import Any, Unpack
 
 import gymnasium
@@ -8,13 +7,12 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
-from uuv_marl.baselines import make, with_policy_requirements
-from uuv_marl.envs.core import Changes, Reward, ScenarioLike, StepResult, changed, make_batched_env
+from uuv_marl.baselines import make_policy
+from uuv_marl.envs.changes import Changes, Reward, ScenarioLike
+from uuv_marl.envs.core import StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin, SpecMixin
-from uuv_marl.scenario import Scenario, ScenarioError
-from uuv_marl.scenario.overrides import override_of
 from uuv_marl.sim.arguments import action_array, rounding, world_seeds
 from uuv_marl.sim.observation import Observe
 from uuv_marl.types import Float32
@@ -31,9 +29,8 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     ``arrived``, ``time_s``, ``collisions`` (``uuv_marl.envs.ending.ending``).
 
     Args:
-        others: name of a policy, or ``module:Class``. The scenario gets the channels, the yaw damping and the clock
-            that the policy declares (``uuv_marl.baselines.granted``), also for the learner: ``sdc`` makes observations
-            longer.
+        others: name of a policy, or ``module:Class``. The scenario gets its requirements
+            (``uuv_marl.with_policy_requirements``), also for the learner: ``sdc`` makes observations longer.
         render_mode: ``human``, ``rgb_array`` or None.
         render_options: as for ``uuv_marl.parallel_env``; the sonar shown is the learner's unless ``sonar_of`` says
             otherwise.
@@ -42,7 +39,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         changes: ``num_vehicles``, ``decision_period``, ``task`` and ``overrides``, likewise.
 
     Raises:
-        ScenarioError: the overrides ask for channels, a yaw damping or a clock that the policy does not declare.
+        ScenarioError: a change contradicts a requirement of ``others``.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # noqa: RUF012
@@ -62,13 +59,14 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     ) -> None:
         if not isinstance(others, str):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"others must be the name of a policy, or module:Class, got {others!r}")
-        asked, overrides = changed(scenario, **changes), changes.get("overrides") or {}
-        overridden = {field for field in (_HEARD, _LOOP, _CLOCK) if override_of(overrides, field) is not None}
-        overridden |= {_CLOCK} if changes.get("decision_period") is not None else set()
-        suited = _suited(others, changed(scenario), asked, overridden)
-        batch = make_batched_env(suited, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms)
+        if "for_policy" in changes:
+            raise TypeError(f"SoloEnv takes no for_policy: the scenario suits others={others!r}; leave it out")
+        batch = make_batched_env(
+            scenario, max_cycles=max_cycles, reward=reward, observe=observe, keep_terms=info_terms, for_policy=others,
+            **changes,
+        )  # fmt: skip
         self._wrap(batch, render_mode, render_options, sonar_of=0)
-        self._others = make(others, self.scenario)
+        self._others = make_policy(others, self.scenario)
         self._info_terms = info_terms
         layout = batch.layout
         self.observation_space = Box(layout.low, layout.high)
@@ -112,27 +110,3 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         if self._info_terms:
             info["reward_terms"] = {name: float(term[0, 0]) for name, term in result.terms.items()}
         return info
-
-
-_HEARD, _LOOP, _CLOCK = "sonar.channels", "actuators.yaw_damping_nms", "timing.decision_period_s"
-
-
-def _suited(others: str, bare: Scenario, asked: Scenario, overridden: set[str]) -> Scenario:
-    """The scenario as the others need it. Raises ScenarioError where that would drop fields that were given."""
-    suited = with_policy_requirements(others, asked)
-    remedy = "leave it out, or choose other others"
-    channels = suited.sonar.channels
-    dropped = {*asked.sonar.channels} - {*channels} - ({"link"} if "modem" in channels else set())
-    if dropped and (_HEARD in overridden or asked.sonar.channels != bare.sonar.channels):
-        raise ScenarioError(
-            f"{_HEARD} can't hold {', '.join(sorted(dropped))}: with {others!r} the learner has "
-            f"{', '.join(channels) or 'no channels'}; {remedy}"
-        )
-    for name in (_LOOP, _CLOCK):
-        section, field = name.split(".")
-        wanted, granted_now = (getattr(getattr(each, section), field) for each in (asked, suited))
-        if name in overridden and not math.isclose(wanted, granted_now, rel_tol=1e-9):
-            raise ScenarioError(
-                f"{name} can't be {wanted:g}: with {others!r} all vehicles have {granted_now:g}; {remedy}"
-            )
-    return suited

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from uuv_marl.percept import DIRECTION, FLAG, LENGTH, POSITION, SPEED, YAW_RATE, Kind, PerceptField, PerceptLayout
+from uuv_marl.percept import DIRECTION, FLAG, LENGTH, POSITION, SPEED, YAW_RATE, PerceptField, PerceptLayout, Quantity
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float32
 
-_TIME = Kind("1", 1.0, 0.0, 2.0)
+_TIME = Quantity("1", 1.0, 0.0, 2.0)
 
 
 def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:

@@ -6,7 +6,8 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.core import EnvOptions, ScenarioLike, make_batched_env
+from uuv_marl.envs.changes import EnvOptions, ScenarioLike
+from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.mixins import EnvMixin
 from uuv_marl.extras import extra
 from uuv_marl.percept import PerceptLayout
@@ -36,8 +37,8 @@ class SwarmEnv(EnvMixin, EnvBase):
         scenario: a name, a TOML file or a ``Scenario``.
         seed: of the first reset, in which world w starts from ``seed + w``; as ``set_seed``.
         device: where the tensors go; the simulation stays on the CPU.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period`` and
-            ``overrides``, as for ``uuv_marl.parallel_env``.
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period``,
+            ``overrides`` and ``for_policy``, as for ``uuv_marl.parallel_env``.
     """
 
     def __init__(

@@ -9,7 +9,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from uuv_marl.envs.core import BatchedEnv, EnvOptions, ScenarioLike, StepResult, make_batched_env
+from uuv_marl.envs.changes import EnvOptions, ScenarioLike
+from uuv_marl.envs.core import BatchedEnv, StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import EnvMixin, SpecMixin
@@ -194,9 +195,9 @@ def vector_env(
         info_terms: put the reward's terms into the infos.
         autoreset_mode: ``SAME_STEP``, ``NEXT_STEP`` or ``DISABLED`` of Gymnasium's ``AutoresetMode``, or its name; see
             ``SwarmVectorEnv``.
-        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period`` and
-            ``overrides``, as for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this ``reward`` for each
-            vehicle; the reward of a row is the mean over all vehicles, with ``team`` that of ``dense``.
+        options: ``num_vehicles``, ``max_cycles``, ``reward``, ``observe``, ``task``, ``decision_period``,
+            ``overrides`` and ``for_policy``, as for ``uuv_marl.parallel_env``. ``infos["agent_reward"]`` is this
+            ``reward`` for each vehicle; the reward of a row is the mean over all vehicles, with ``team`` of ``dense``.
     """
     batch = make_batched_env(scenario, num_envs, order=("num_envs", "scenario"), keep_terms=info_terms, **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.benchmark.evaluate import Run, blaming, evaluate
+from uuv_marl.benchmark.evaluate import Run, blaming, episodes
 from uuv_marl.errors import ReplayError
 from uuv_marl.replay.events import arrival, collisions, losses, near_misses
 from uuv_marl.replay.recording import Event, Inspection, Recording, Water
@@ -45,7 +45,7 @@ def record(
     scenario = with_policy_requirements(policy, scenario)
     tape = _Tape(watched)
     with blaming(policy):
-        for event in evaluate(scenario, policy, [seed], tape):
+        for event in episodes(scenario, policy, [seed], tape):
             if isinstance(event, Run):
                 return tape.recording(scenario, policy, event)
             if report:

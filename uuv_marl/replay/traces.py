@@ -18,6 +18,7 @@ from uuv_marl.replay.record import finite
 from uuv_marl.replay.recording import Event, Recording, Water
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.files import frozen
+from uuv_marl.scenario.messages import explain
 from uuv_marl.sim.disturbances.current import Flow, advance_gust, water
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trajectory import reference
@@ -164,14 +165,13 @@ def _recording(saved: Saved, name: str, policy: str, seed: int, metrics: Metrics
 
 def _scenario(saved: Saved, name: str, policy: str) -> Scenario:
     """The scenario of a run, with the policy's requirements."""
+    data = frozen(saved.content["scenarios"][name])
     try:
-        scenario = Scenario.model_validate(frozen(saved.content["scenarios"][name]))
+        scenario = Scenario.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(map(str, first["loc"]))
         raise ReplayError(
-            f"{saved.folder / FILE} describes {name!r} in the words of another version of uuv_marl ({field}: "
-            f"{first['msg']}); run the benchmark again"
+            f"{saved.folder / FILE} describes {name!r} as another version of uuv_marl "
+            f"({explain(error, data, Scenario)}); run the benchmark again"
         ) from None
     return with_requirements(policy, requirements_of(saved.content["policies"][policy]), scenario)
 

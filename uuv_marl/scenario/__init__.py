@@ -1,4 +1,4 @@
-"""Scenarios: everything that fixes a simulation, except the seed.
+"""Scenarios: everything that defines a simulation, except the seed.
 
 ``load_scenario`` makes a ``Scenario`` from a name, a TOML file or another scenario. The ``*.toml`` files hold the
 shipped scenarios, every number with its source.
@@ -14,22 +14,7 @@ from uuv_marl.scenario.sections import growth
 from uuv_marl.scenario.vehicle_files import load_vehicle, show_vehicle, variant_names, vehicle_names
 
 __all__ = [
-    "IDEAL",
-    "MAX_RANGE_M",
-    "Scenario",
-    "ScenarioError",
-    "conditions",
-    "differences",
-    "disturbances",
-    "growth",
-    "load_scenario",
-    "load_vehicle",
-    "parse_override",
-    "scenario_names",
-    "show",
-    "show_vehicle",
-    "sonar_is_ideal",
-    "to_toml",
-    "variant_names",
-    "vehicle_names",
+    "IDEAL", "MAX_RANGE_M", "Scenario", "ScenarioError", "conditions", "differences", "disturbances", "growth",
+    "load_scenario", "load_vehicle", "parse_override", "scenario_names", "show", "show_vehicle", "sonar_is_ideal",
+    "to_toml", "variant_names", "vehicle_names",
 ]  # fmt: skip

@@ -1,32 +1,31 @@
-"""A scenario's disturbances in a few words, for headers of tables, pages and pictures."""
+"""Short descriptions of a scenario's disturbances, for headers of tables, pages and pictures."""
 
 from uuv_marl.scenario.disturbance_sections import Fault
 from uuv_marl.scenario.scenario import Scenario
 
-IDEAL = "still water, no noise, no delay"
-"""The conditions of a scenario in which nothing is on."""
+IDEAL = "still water, no noise, no delay"  # conditions of a scenario without disturbances
 
 
 def conditions(scenario: Scenario) -> str:
-    """The disturbances that are on, such as ``current 0.5 m/s, sonar 0.3 s late``; ``IDEAL`` if there are none."""
+    """Active disturbances, such as ``current 0.5 m/s, sonar 0.3 s late``; ``IDEAL`` if there are none."""
     return ", ".join(disturbances(scenario)) or IDEAL
 
 
 def disturbances(scenario: Scenario) -> list[str]:
-    """A phrase with numbers for each disturbance that is on."""
+    """A phrase with numbers for each active disturbance."""
     traffic = scenario.traffic
-    moving = f"{traffic.share:.3g} of obstacles move at {traffic.speed_mps:g} m/s, {traffic.amplitude_m:g} m to and fro"
+    moving = f"{traffic.share:.3g} of obstacles move at {traffic.speed_mps:g} m/s, amplitude {traffic.amplitude_m:g} m"
     return [*vehicle_disturbances(scenario), *([moving] if traffic.moves else [])]
 
 
 def vehicle_disturbances(scenario: Scenario) -> list[str]:
-    """Those of the sea itself, which acts on vehicles; not those of the obstacles."""
+    """Disturbances of vehicles and sonar, without moving obstacles."""
     parts = (_current(scenario), _latency(scenario), _noise(scenario), _rest(scenario))
     return [phrase for part in parts for phrase, on in part.items() if on]
 
 
 def sonar_is_ideal(scenario: Scenario) -> bool:
-    """Whether sonars hear without delay, noise or loss."""
+    """Whether sonar readings have no delay, noise or loss."""
     deaf = any(fault.kind == "array" and fault.share > 0.0 for fault in scenario.faults)
     return not deaf and not any([*_latency(scenario).values(), *_noise(scenario).values()])
 
@@ -58,7 +57,7 @@ def _noise(scenario: Scenario) -> dict[str, bool]:
         f"bearing noise {noise.bearing_deg:g} deg": noise.bearing_deg > 0.0,
         f"range noise {noise.range_m:g} m + {noise.range_share:.3g}": noise.range_m > 0.0 or noise.range_share > 0.0,
         f"passive range factor, log-sd {noise.passive_range_log_sd:g}": noise.passive_range_log_sd > 0.0,
-        "passive arrays hear bearings only": not noise.passive_ranges,
+        "passive arrays measure bearings only": not noise.passive_ranges,
         f"active arrays detect half at {noise.active_r50_m:g} m": noise.active_r50_m > 0.0,
         f"passive arrays detect half at {noise.passive_r50_m:g} m": noise.passive_r50_m > 0.0,
         f"silence begins at {noise.silence_probability:.3g} of readings": noise.silence_probability > 0.0,
@@ -76,7 +75,7 @@ def _rest(scenario: Scenario) -> dict[str, bool]:
     lost = scenario.modem.loss_probability
     return {
         f"messages every {every_s:.3g} s, {lost:.3g} of them lost": "modem" in scenario.sonar.channels,
-        f"position drifts by {navigation.drift_share:.3g} of the way": navigation.drift_share > 0.0,
+        f"position drifts by {navigation.drift_share:.3g} of the distance": navigation.drift_share > 0.0,
         f"compass bias {navigation.compass_bias_deg:g} deg": navigation.compass_bias_deg > 0.0,
         f"thrust lags {actuators.thrust_lag_s:g} s": actuators.thrust_lag_s > 0.0,
         f"torque lags {actuators.yaw_lag_s:g} s": actuators.yaw_lag_s > 0.0,
@@ -87,6 +86,6 @@ def _rest(scenario: Scenario) -> dict[str, bool]:
 
 
 def _fault_phrase(fault: Fault) -> str:
-    """A fault, and what it leaves."""
+    """A fault and its remaining efficiency."""
     left = f" to {fault.efficiency:.3g}" if fault.efficiency > 0.0 else ""
     return f"{fault.kind if fault.array is None else f'{fault.array} array'} fault{left}"

@@ -1,4 +1,4 @@
-"""TOML files that were read: text, data, and the comment beside each value."""
+"""TOML files: text, data, and the comment beside each value."""
 
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -14,20 +14,20 @@ _MAX_BYTES = 1_000_000
 
 
 class File(NamedTuple):
-    """A TOML file that was read."""
+    """A TOML file."""
 
     path: Path
     text: str
     data: dict[str, Any]
     variants: Sequence[str] = ()
-    """Those that are chosen, of a vehicle's file."""
+    """Selected variants of a vehicle's file."""
 
 
 def read_toml(path: Path) -> File:
-    """Read a file. Raises ScenarioError naming it where it can't be read, is too large or is not valid TOML."""
+    """Read a file. Raises ScenarioError if it can't be read, is too large or is not valid TOML."""
     try:
         if path.stat().st_size > _MAX_BYTES:
-            raise ScenarioError(f"{path} is no scenario: it has more than {_MAX_BYTES:,} bytes")
+            raise ScenarioError(f"{path} is not a scenario: it has more than {_MAX_BYTES:,} bytes")
         text = path.read_text(encoding="utf-8")
         return File(path, text, tomllib.loads(text))
     except OSError as error:
@@ -47,7 +47,7 @@ def merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
 
 
 def replaced(old: Any, new: Any) -> Any:
-    """What stands where the new value comes in place of the old one: two tables merge."""
+    """The new value, merged with the old one if both are tables."""
     both = isinstance(old, dict) and isinstance(new, dict)
     return merged(cast(dict[str, Any], old), cast(dict[str, Any], new)) if both else cast(Any, new)
 

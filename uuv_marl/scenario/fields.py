@@ -1,16 +1,15 @@
-"""What the fields of a scenario may hold: plausible ranges, names, and the base of all sections."""
+"""Types of a scenario's fields: plausible ranges, names, and the base class of sections."""
 
 from typing import Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-MAX_RANGE_M = 4096.0
-"""Positions in a percept saturate here, so that observation bounds are finite."""
+MAX_RANGE_M = 4096.0  # largest position in a percept, so that observations are bounded
 
 
 def within(low: float, high: float) -> AfterValidator:
-    """The range in which a number is plausible, both ends included."""
+    """Validator of a number's plausible range, both ends included."""
 
     def check(value: float) -> float:
         if not low <= value <= high:
@@ -32,11 +31,11 @@ Lag = Annotated[float, within(0, 3_600)]
 NAME = "^[A-Za-z0-9_-]+$"
 Name = Annotated[str, Field(pattern=NAME, max_length=100)]
 VehicleName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+(\+[A-Za-z0-9_-]+)*$", max_length=100)]
-"""A vehicle's, with a plus before each variant."""
+"""A vehicle's name, with a plus before each variant."""
 
 
 class Section(BaseModel):
-    """A part of a scenario: immutable, no unknown fields, no silent conversion."""
+    """A part of a scenario: frozen, without unknown fields or silent conversion."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, use_attribute_docstrings=True)
 
@@ -46,4 +45,4 @@ class Section(BaseModel):
         return self
 
     def _check(self) -> None:
-        """Raise ValueError where one field contradicts another."""
+        """Raise ValueError if fields contradict each other."""

@@ -23,7 +23,7 @@ _BASE = _FOLDER / "base.toml"
 
 
 def scenario_names() -> list[str]:
-    """Names of the scenarios that ship with the package. Raises ScenarioError where its files are not on the disk."""
+    """Names of the shipped scenarios. Raises ScenarioError if the package's data files are missing."""
     names = sorted(path.stem for path in _FOLDER.glob("*.toml") if path != _BASE)
     if not names:
         raise ScenarioError(
@@ -39,18 +39,18 @@ def load_scenario(
     num_vehicles: int | None = None,
     overrides: Mapping[str, object] | None = None,
 ) -> Scenario:
-    """A scenario by name, from a TOML file, or changed from another.
+    """Load a scenario by name or from a TOML file, or change another.
 
     Args:
-        scenario: a shipped name (``scenario_names()``), a path ending in ``.toml``, a ``Scenario``, or all
-            of its fields as ``Scenario.model_dump`` gives them, for places that hold plain data only.
-            A file states only what differs from the scenario named by its ``extends``, else from ``base.toml``.
+        scenario: a shipped name (``scenario_names()``), a path ending in ``.toml``, a ``Scenario``, or a dictionary of
+            all fields as ``Scenario.model_dump`` returns it. A file states only its differences from the scenario named
+            by ``extends``, else from ``base.toml``.
         num_vehicles: replaces ``swarm.num_vehicles``.
         overrides: ``{"sonar.echo_reports": "surface", "sonar.arrays.bow.range_m": 80.0}``; entries of lists are
-            addressed by their name or index. A table changes only the fields that it has, a list is replaced. Values
-            may be those of NumPy, torch or OmegaConf. ``{"vehicle": "lauv"}`` replaces the vehicle, its limits and
-            lags, and ``{"vehicle": "remus100+munk_on"}`` takes a variant of it; where the scenario fixes the inner
-            loop for all (``timing.fixed``), another vehicle has none unless an override gives it.
+            addressed by name or index. A table changes only its fields, a list is replaced. Values may be those of
+            NumPy, torch or OmegaConf. ``{"vehicle": "lauv"}`` replaces the vehicle, its limits and lags, and
+            ``{"vehicle": "remus100+munk_on"}`` selects a variant of it; where the scenario fixes the inner loop for all
+            policies (``timing.fixed``), another vehicle has none unless an override sets it.
 
     Raises:
         ScenarioError: names the field, the value and the remedy.
@@ -73,7 +73,7 @@ def load_scenario(
             assign(data, "swarm.num_vehicles", plain(num_vehicles))
         return Scenario.model_validate(frozen(data))
     except ValidationError as error:
-        raise ScenarioError("\n".join(explain(dict(e), data) for e in error.errors()[:10])) from None
+        raise ScenarioError(explain(error, data, Scenario, most=10)) from None
     except RecursionError:
         raise ScenarioError(
             f"scenario {shown(scenario)} or its overrides are nested too deeply; flatten them"
@@ -81,13 +81,13 @@ def load_scenario(
 
 
 def to_toml(scenario: Scenario) -> str:
-    """The whole scenario as TOML that ``load_scenario`` reads back."""
+    """The complete scenario as TOML that ``load_scenario`` reads."""
     data = scenario.model_dump(mode="json", exclude_none=True, exclude={"name"})
     return tomlkit.dumps(data)  # pyright: ignore[reportUnknownMemberType]
 
 
 def differences(scenario: Scenario) -> list[str]:
-    """``field=value`` wherever a scenario differs from the shipped one of its name; everything where there is none."""
+    """``field=value`` for every difference from the shipped scenario of the same name, or every field without one."""
     shipped = load_scenario(scenario.name) if scenario.name in scenario_names() else None
     before = leaves(shipped.model_dump(mode="json")) if shipped else {}
     now = leaves(scenario.model_dump(mode="json"))
@@ -132,7 +132,7 @@ def _find(name: Any, beside: Path | None = None) -> Path:
 
 
 def _chain(path: Path) -> list[File]:
-    """The file and all that it extends, down to the base."""
+    """The file and all files that it extends, down to the base."""
     chain = [read_toml(path)]
     while not chain[-1].path.samefile(_BASE):
         last = chain[-1]
@@ -147,7 +147,7 @@ def _chain(path: Path) -> list[File]:
 
 
 def _layers(path: Path) -> Iterator[File]:
-    """The base, what extends it, and the file itself; before each the vehicle that it names."""
+    """The base, the files that extend it, and the file itself; before each the vehicle that it names."""
     for file in reversed(_chain(path)):
         named = file.data.get("vehicle")
         if isinstance(named, str):
@@ -157,7 +157,7 @@ def _layers(path: Path) -> Iterator[File]:
 
 
 def _data(scenario: Any) -> dict[str, Any]:
-    """A scenario's fields and values, not yet checked."""
+    """A scenario's fields and values, not yet validated."""
     if isinstance(scenario, Scenario | Mapping):
         return plain(cast(object, scenario))
     path = _find(scenario)
@@ -177,7 +177,7 @@ def _data(scenario: Any) -> dict[str, Any]:
 
 
 def _of_vehicle(data: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
-    """Fields and values. With another vehicle than before goes the inner loop that the scenario fixed for that one."""
+    """The data; a fixed inner loop is set to 0 if the vehicle differs from ``before``."""
     names = [each.get("vehicle", {}).get("name") for each in (before, data)]
     if data.get("timing", {}).get("fixed") and None not in names and names[0] != names[1]:
         data["actuators"]["yaw_damping_nms"] = 0.0
@@ -185,7 +185,7 @@ def _of_vehicle(data: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
 
 
 def frozen(value: Any) -> Any:
-    """A document's value with tuples in place of lists, as a scenario takes it."""
+    """A document's value with tuples in place of lists."""
     if isinstance(value, dict):
         return {key: frozen(entry) for key, entry in cast(dict[str, Any], value).items()}
     if isinstance(value, (list, tuple)):

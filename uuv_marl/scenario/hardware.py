@@ -1,4 +1,4 @@
-"""What a scenario's vehicles are: hull, actuators and sonar arrays, as sections.
+"""Vehicles of a scenario: hull, actuators and sonar arrays, as sections.
 
 In SI units and degrees. Symbols of the vehicle are Fossen's; resistances (X_u, Y_v, ...) are positive, as in the
 paper's Eq. 4.
@@ -9,30 +9,18 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from uuv_marl.scenario.fields import (
-    Lag,
-    NonNegative,
-    NonPositive,
-    Positive,
-    Radius,
-    Section,
-    Signed,
-    Speed,
-    VehicleName,
-    within,
-)  # fmt: skip
+from uuv_marl.scenario import fields
+from uuv_marl.scenario.fields import Lag, NonNegative, NonPositive, Positive, Radius, Section, Signed, Speed, within
 
-MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0
-"""Widths of sub-sectors that the sonar's table of directions is made for."""
-CHANNEL_NAMES = ("compass", "link", "current", "age", "ranged", "modem")
-"""Channels that every task can grant."""
+MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0  # widths of sub-sectors that the sonar's table of directions supports
+CHANNEL_NAMES = ("compass", "link", "current", "age", "ranged", "modem")  # channels of every task
 
 
 class Vehicle(Section):
     """Parameters of Eq. 3-4. Dimensions follow from the force or moment and the velocities they multiply."""
 
-    name: VehicleName
-    """The file in ``vehicles/`` that the numbers come from, and its variants, where nothing overrides them."""
+    name: fields.VehicleName
+    """The file in ``vehicles/`` with the numbers, and its variants, unless overridden."""
     m_kg: Positive
     I_z_kgm2: Positive
     x_G_m: Annotated[float, within(-100, 100)]
@@ -51,23 +39,23 @@ class Vehicle(Section):
     N_rv: Signed
     N_rr: NonNegative
     N_vv: Signed = 0.0
-    """Beside N_v, the yaw moment ``N_vv |v| v``. Like N_v it is a derivative: a positive one adds."""
+    """Yaw moment ``N_vv |v| v``, a derivative like N_v: a positive one adds."""
     Y_uv: Signed = 0.0
     """Lift of body and fins: the sway force (Y_uv v + Y_ur r) max(u, 0) and the yaw moment (N_uv v + N_ur r) max(u, 0).
-    Derivatives, of lift alone: where ``munk_moment`` is on, the added masses' part of a source's sums is in C(nu)."""
+    Derivatives, of lift alone: with ``munk_moment``, the added masses' part of a source's sums is in C(nu)."""
     Y_ur: Signed = 0.0
     N_uv: Signed = 0.0
     N_ur: Signed = 0.0
     munk_moment: bool = True
-    """Whether added masses count in C(nu) (Eq. 4), which turn a hull across its way. Inertia has them always."""
+    """Whether C(nu) (Eq. 4) includes added masses, which turn a hull across its path. Inertia always does."""
     length_m: Positive | None = None
     """Length of the hull."""
     cruise_mps: Speed | None = None
-    """The speed that it is made for; a rudder's steerage way is a share of it."""
+    """Cruise speed; a rudder's steerage way is a share of it."""
     max_mps: Speed | None = None
-    """The top speed that the source states."""
+    """Top speed according to the source."""
     source: str | None = None
-    """Where the numbers come from, in a line."""
+    """Source of the numbers, in a line."""
 
     @property
     def inertia(self) -> tuple[float, float, float, float]:
@@ -80,7 +68,7 @@ class Vehicle(Section):
         )
 
     def times(self, mass: float, added_mass: float, drag: float) -> "Vehicle":
-        """A vehicle whose masses (and moment of inertia), added masses, and resistances and lift are times these."""
+        """The vehicle with scaled masses (and moment of inertia), added masses, and resistances and lift."""
         factors = dict.fromkeys(("m_kg", "I_z_kgm2"), mass)
         factors |= dict.fromkeys(("X_udot_kg", "Y_vdot_kg", "Y_rdot_kgm", "N_rdot_kgm2"), added_mass)
         factors |= dict.fromkeys(("X_u", "Y_v", "Y_r", "N_v", "N_r", "X_uu", "Y_vv", "Y_rr", "N_rv", "N_rr"), drag)
@@ -92,29 +80,29 @@ class Actuators(Section):
     """Limits of thrust and torque, or of thrust and rudder, the same for every policy."""
 
     max_force_n: Positive
-    """Surge force at full action, ahead; astern too, unless ``max_astern_n`` says otherwise."""
+    """Surge force at full action, ahead; astern too, unless ``max_astern_n`` is given."""
     max_torque_nm: Positive
-    """Yaw torque at full action. With a rudder it is no limit: hand-made policies divide the torque that they want by
-    it, so it should be what full rudder gives at cruise."""
+    """Yaw torque at full action. With a rudder it is not a limit: hand-made policies divide the desired torque by it,
+    so it should be what full rudder gives at cruise speed."""
     lever_arm_m: Annotated[float, within(0.001, 1_000)]
-    """Turns the sideways component of a desired force into a torque (Eq. 22)."""
+    """Converts the sideways component of a desired force into a torque (Eq. 22)."""
     yaw_damping_nms: NonNegative
     """Inner loop: torque -c r, added within the torque limit."""
     thrust_lag_s: Lag
-    """Time constant with which thrust follows what is asked; 0: at once."""
+    """Time constant of the thrust; 0: immediate."""
     yaw_lag_s: Lag
-    """Time constant with which the torque follows."""
+    """Time constant of the torque."""
     yaw_authority: Annotated[float, within(0, 1)]
-    """Share of the torque, or of the rudder's angle, that reaches the water."""
+    """Effective share of the torque, or of the rudder's angle."""
     kind: Literal["force_torque", "rudder"] = "force_torque"
-    """What the second number of an action is a share of: ``max_torque_nm``, or ``rudder_max_deg``. With a rudder both
-    numbers lie in a box, not on the unit disc, and stay as they are between control holds."""
+    """Meaning of an action's second number: a share of ``max_torque_nm``, or of ``rudder_max_deg``. With a rudder both
+    numbers lie in a square, not on the unit disc, and stay constant between control steps."""
     max_astern_n: NonNegative | None = None
-    """Surge force at full action astern, where it is not ``max_force_n``."""
+    """Surge force at full action astern, if not ``max_force_n``."""
     Y_uud: Signed = 0.0
     """A rudder's sway force, Y_uud max(u, 0)^2 times its angle [rad], and yaw moment, N_uud max(u, 0)^2 times it. Signs
-    as in the source: an angle that is positive there turns to port where N_uud is negative (Fossen). An action that is
-    positive turns to starboard always."""
+    as in the source: an angle that is positive there turns to port where N_uud is negative (Fossen). A positive action
+    always turns to starboard."""
     N_uud: Signed = 0.0
     rudder_max_deg: Annotated[float, within(0, 60)] = 0.0
     """The rudder's largest angle, to either side."""
@@ -126,7 +114,7 @@ class Actuators(Section):
 
     @property
     def rudder(self) -> tuple[float, float]:
-        """Sway force and yaw moment of a rudder over u^2 [kg/m, kg], for an angle that turns it clockwise."""
+        """Sway force and yaw moment of a rudder over u^2 [kg/m, kg], for an angle that turns the vehicle clockwise."""
         side = -1.0 if self.N_uud < 0.0 else 1.0
         return side * self.Y_uud, side * self.N_uud
 
@@ -154,18 +142,18 @@ class Actuators(Section):
 
 
 class SonarArray(Section):
-    """One fan, split into equal sub-sectors; the nearest vehicle of each is heard."""
+    """One fan, split into equal sub-sectors, each of which detects its nearest vehicle."""
 
     name: Annotated[str, Field(min_length=1)]
     """Unique within the suite."""
     kind: Literal["active", "passive"]
-    """Only active arrays hear obstacles."""
+    """Active arrays detect vehicles and obstacles, passive ones only vehicles."""
     mounting_deg: Annotated[float, within(-360, 360)]
     """Direction of the fan's axis, clockwise from the bow."""
     aperture_deg: Annotated[float, within(0.01, 360)]
     """Width of the fan."""
     range_m: Radius
-    """Vehicles nearer than this, and obstacles whose surface is, are heard."""
+    """Largest distance of detected vehicles, and of detected obstacles' surfaces."""
     sub_sectors: Annotated[int, within(1, 64)]
     """k_a (Eq. 12)."""
 
@@ -184,18 +172,18 @@ class SonarArray(Section):
 
 
 class Sonar(Section):
-    """What a vehicle hears."""
+    """Sonar of a vehicle."""
 
     echo_reports: Literal["centre", "surface"]
-    """What an echo's position is: the obstacle's centre, or the nearest point of its surface in the beam."""
+    """Position of an echo: the obstacle's centre, or the nearest point of its surface in the beam."""
     obstacles_hide_vehicles: bool
-    """Whether an obstacle on the line of sight silences a vehicle."""
+    """Whether an obstacle on the line of sight hides a vehicle."""
     channels: tuple[str, ...]
-    """Granted beyond the percept: ``compass`` (heading), ``link`` (an oracle of neighbours' identity and velocity),
-    ``modem`` (the same as their latest messages tell it), ``current`` (own velocity over ground and through the water),
+    """Observations beyond the percept: ``compass`` (heading), ``link`` (neighbours' true identity and velocity),
+    ``modem`` (the same from their latest messages), ``current`` (own velocity over ground and through the water),
     ``age`` (of each sub-sector's reading), ``ranged`` (whether its range was measured), and those of the task."""
     arrays: Annotated[tuple[SonarArray, ...], Field(min_length=1)]
-    """The suite; their order is the order of sub-sectors in the percept."""
+    """The arrays, in the order of sub-sectors in the percept."""
 
     @property
     def num_sectors(self) -> int:

@@ -1,10 +1,11 @@
-"""Messages on what is wrong with a scenario: one line of ours for each of pydantic's errors."""
+"""Messages for pydantic's validation errors, and values as messages show them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, cast, get_args, get_origin
 
+from pydantic import BaseModel, ValidationError
+
 from uuv_marl.errors import nearest
-from uuv_marl.scenario.scenario import Scenario
 
 _SHOWN = 80
 _EXPLANATIONS = {
@@ -25,13 +26,25 @@ _EXPLANATIONS = {
 }
 
 
-def explain(error: dict[str, Any], data: Mapping[str, Any]) -> str:
-    """One line of ours for one of pydantic's errors."""
-    kind, got = error["type"], error["input"]
-    if kind == "value_error":
-        return str(error["ctx"]["error"])
+def explain(
+    error: ValidationError, data: object, model: type[BaseModel] | None = None, prefix: str = "", most: int = 1
+) -> str:
+    """Messages for the first of pydantic's errors, one a line: the field, its value and the remedy.
+
+    Args:
+        error: raised by a validation.
+        data: the validated data, for names of list entries.
+        model: the validated model, whose fields are suggested in place of an unknown one.
+        prefix: of the fields in messages, such as ``task.``.
+        most: largest number of lines.
+    """
+    fields = list(_fields(model)) if model else []
+    return "\n".join(_line(dict(each), data, fields, prefix) for each in error.errors()[:most])
+
+
+def _line(error: dict[str, Any], data: object, fields: Sequence[str], prefix: str) -> str:
+    kind, names = error["type"], list[str]()
     place: Any = data
-    names: list[str] = []
     for part in error["loc"]:
         try:
             place = cast(dict[Any, Any], place)[part]
@@ -39,35 +52,36 @@ def explain(error: dict[str, Any], data: Mapping[str, Any]) -> str:
             place = None
         name = cast(dict[str, Any], place).get("name") if isinstance(part, int) and isinstance(place, dict) else None
         names.append(str(name or part))
-    field = short(".".join(names)) or "''"
+    field = short(prefix + ".".join(names)) or "''"
+    if kind == "value_error":
+        reason = str(error["ctx"]["error"])
+        return f"{field} {reason}" if reason.startswith("must ") else reason
+    if not error["loc"]:
+        return str(error["msg"])
     if kind == "missing":
-        return f"{field} is missing; set it in the scenario's file or override it"
+        return f"{field} is missing; give it a value"
     if kind == "extra_forbidden":
-        return f"{field} is unknown{_nearest(error['loc'])}"
-    explanation = _EXPLANATIONS.get(kind, "is not usable: {message}")
-    return f"{field} {explanation.format(**error.get('ctx', {}), message=error['msg'])}, got {shown(got)}"
+        return f"{field} is unknown{_nearest(error['loc'], fields, prefix)}"
+    _, should, demand = str(error["msg"]).partition(" should ")
+    explanation = _EXPLANATIONS.get(kind, "must {demand}" if should else "is not usable: {message}")
+    text = explanation.format(**error.get("ctx", {}), message=error["msg"], demand=demand)
+    return f"{field} {text}, got {shown(error['input'])}"
 
 
-def _nearest(location: Sequence[str | int]) -> str:
-    """What an unknown field may mean: the same name elsewhere, else a like one here, else a like one elsewhere."""
-    last, prefix = str(location[-1]), "".join(f"{0 if isinstance(part, int) else part}." for part in location[:-1])
-    every = list(_fields(Scenario))
-    here = dict.fromkeys(field.removeprefix(prefix).partition(".")[0] for field in every if field.startswith(prefix))
-    leaves = {field.rpartition(".")[2]: field for field in reversed(every)}
-    location_text = ".".join(map(str, (*location[:-1], "")))
-    near = [leaves[last]] if last in leaves else _like(last, {name: location_text + name for name in here})
-    near = near or _like(last, leaves)
-    return f"; did you mean {near[0]!r}?" if near else f"; the fields here are {', '.join(here)}"
-
-
-def _like(name: str, names: Mapping[str, str]) -> list[str]:
-    """What stands beside the name that is most like this one, if there is any."""
-    near = nearest(name, names, 0.5)
-    return [names[near]] if near else []
+def _nearest(location: Sequence[str | int], fields: Sequence[str], prefix: str) -> str:
+    """Suggestion for an unknown field: the same name elsewhere, a similar one here, a similar one elsewhere."""
+    last, table = str(location[-1]), "".join(f"{0 if isinstance(part, int) else part}." for part in location[:-1])
+    here = dict.fromkeys(field.removeprefix(table).partition(".")[0] for field in fields if field.startswith(table))
+    leaves = {field.rpartition(".")[2]: prefix + field for field in reversed(fields)}
+    nested = {name: prefix + ".".join(map(str, (*location[:-1], name))) for name in here}
+    near = (
+        leaves.get(last) or nested.get(nearest(last, nested, 0.5) or "") or leaves.get(nearest(last, leaves, 0.5) or "")
+    )
+    return f"; did you mean {near!r}?" if near else f"; the fields here are {', '.join(here) or 'none'}"
 
 
 def _fields(model: Any, prefix: str = "") -> Iterator[str]:
-    """All fields of a scenario as overrides address them; the first entry stands for a list's."""
+    """All fields of a model as overrides address them; index 0 stands for every entry of a list."""
     for name, info in model.model_fields.items():
         kind = info.annotation
         inner = [part for part in (kind, *get_args(kind)) if hasattr(part, "model_fields")]
@@ -76,13 +90,13 @@ def _fields(model: Any, prefix: str = "") -> Iterator[str]:
 
 
 def shown(value: object) -> str:
-    """A value as a message can hold it."""
+    """A value as text of bounded length."""
     try:
         return short(repr(value))
     except (ValueError, RecursionError):
-        return f"{type(value).__name__} that is too large to show"
+        return f"{type(value).__name__} too large to show"
 
 
 def short(text: str) -> str:
-    """A text as a message can hold it."""
+    """A text of bounded length."""
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."

@@ -1,4 +1,4 @@
-"""Fields of a scenario by name: ``field=value`` on the command line, and where in nested tables a field lies."""
+"""Fields of a scenario by name: ``field=value`` on the command line, and assignment in nested tables."""
 
 import os
 import tomllib
@@ -17,11 +17,11 @@ from uuv_marl.scenario.task import named_task
 _PLAIN: tuple[tuple[type, Callable[[Any], object]], ...] = (
     (os.PathLike, os.fspath), (Integral, int), (Real, float), (Decimal, float),
 )  # fmt: skip
-"""Kinds of values, and what makes them plain."""
+"""Types of values and their conversions."""
 
 
 def parse_override(text: str) -> tuple[str, object]:
-    """``field=value`` as the command line gives it; the value in TOML, a bare word taken as text."""
+    """Parse ``field=value`` of the command line; the value in TOML, a bare word taken as text."""
     field, equals, value = text.partition("=")
     if not equals or not field.strip() or "\n" in text.strip():
         raise ScenarioError(
@@ -32,7 +32,7 @@ def parse_override(text: str) -> tuple[str, object]:
     except tomllib.TOMLDecodeError:
         if value.strip().startswith(("[", "{")):
             raise ScenarioError(
-                f"--set {shown(field.strip())} is no list or table of TOML, got {shown(value.strip())}; texts in it "
+                f"--set {shown(field.strip())} must be a list or table, got {shown(value.strip())}; texts in it "
                 'need quotes: \'task.kinds=["pocket", "bar"]\''
             ) from None
         return field.strip(), value.strip()
@@ -41,12 +41,11 @@ def parse_override(text: str) -> tuple[str, object]:
 
 
 def assign(data: dict[str, Any], field: str, value: Any) -> None:
-    """Set a field of nested tables: its keys with dots between, an entry of a list by name or index, in place.
+    """Set a field of nested tables in place: keys joined by dots, an entry of a list by name or index.
 
-    A table changes the fields that it has and leaves the others, as a table of a file does; a list is replaced.
+    A table changes its fields and leaves the others, as a table of a file does; a list is replaced.
 
-    Raises:
-        ScenarioError: a key lies in what is no table, or there is no such entry.
+    Raises ScenarioError if a key is not in a table or an entry does not exist.
     """
     *path, last = field.split(".")
     if path[:1] == ["task"]:
@@ -66,7 +65,7 @@ def assign(data: dict[str, Any], field: str, value: Any) -> None:
 
 
 def leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Fields by the names that ``assign`` takes, instead of tables within tables."""
+    """Values by the field names of ``assign``, instead of nested tables."""
     values: dict[str, Any] = {}
     for key, value in data.items():
         table = isinstance(value, dict)
@@ -75,7 +74,7 @@ def leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def override_of(overrides: Mapping[str, object], field: str) -> object | None:
-    """What overrides give a field, by its name with a dot or in its section's table; None if nothing."""
+    """The override of a field, by its dotted name or in its section's table; None if there is none."""
     section, _, name = field.partition(".")
     table = plain(overrides.get(section)) if name else None
     inside = cast(Mapping[str, object], table).get(name) if isinstance(table, dict) else None
@@ -83,9 +82,9 @@ def override_of(overrides: Mapping[str, object], field: str) -> object | None:
 
 
 def plain(value: object) -> Any:
-    """A value as TOML would give it, in tables and lists of its own: NumPy's, torch's and OmegaConf's are as good.
+    """A value as plain TOML data, from types of NumPy, torch and OmegaConf too.
 
-    Numbers, sequences and mappings are taken for what they can do, and any other value as it is.
+    Numbers, sequences and mappings are recognized by their protocols; other values stay as they are.
     """
     if callable(tolist := getattr(value, "tolist", None)):  # numbers and arrays of NumPy and torch
         value = tolist()

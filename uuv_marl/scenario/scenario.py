@@ -1,6 +1,6 @@
-"""Scenario: everything that fixes a simulation, except the seed; frozen, validated, in SI units and degrees.
+"""``Scenario``: everything that defines a simulation, except the seed; frozen, validated, in SI units and degrees.
 
-The numbers and their sources are in the TOML files beside; nothing here has a default value that matters.
+The numbers and their sources are in the TOML files of this folder; fields here have no default values that matter.
 """
 
 import logging
@@ -14,27 +14,23 @@ from uuv_marl.scenario import disturbance_sections, fields, hardware, sections
 from uuv_marl.scenario.task import TaskSettings, check_channels, check_task, named_task, task_class, task_numbers
 from uuv_marl.scenario.vehicle_checks import check_vehicle, top_speed
 
-MAX_READINGS = 64
-"""Most control holds that the processing of a sonar's reading may take."""
-MAX_EDDIES = 4_096
-"""Most eddies of a world; every vehicle's water is the sum over all of them."""
-MAX_PAST = 1024
-"""Most control holds that sound may take to cross a sonar's range."""
-MAX_STEPS = 10_000
-"""Most integration steps in a decision; compiled code can't be interrupted."""
+MAX_READINGS = 64  # largest processing time of a sonar reading [control steps]
+MAX_EDDIES = 4_096  # largest number of eddies of a world; every vehicle's water velocity is the sum over all of them
+MAX_PAST = 1024  # largest travel time of sound across a sonar's range [control steps]
+MAX_STEPS = 10_000  # largest number of integration steps in a decision; compiled code can't be interrupted
 
 
 class Scenario(fields.Section):
     """A complete configuration. Make one with ``uuv_marl.load_scenario``."""
 
     name: fields.Name
-    """Set by the loader: the file's name; names results and pictures."""
+    """The file's name, set by the loader; names results and pictures."""
     title: str
     """One line."""
     source: str
-    """Where the scenario comes from."""
+    """Origin of the scenario."""
     version: Annotated[int, fields.within(1, 1_000_000)]
-    """Raised by any change of its numbers."""
+    """Increased by any change of its numbers."""
     swarm: sections.SwarmSize
     start: sections.Start
     trajectory: sections.Trajectory
@@ -59,7 +55,7 @@ class Scenario(fields.Section):
     faults: Annotated[tuple[disturbance_sections.Fault, ...], Field(max_length=64)]
     reward: sections.Reward
     task: Annotated[TaskSettings, BeforeValidator(named_task)]
-    """What the swarm is to do: its name, or ``module:Class``, alone or in a table with the task's own numbers."""
+    """The swarm's task: its name, or ``module:Class``, alone or in a table with the task's own numbers."""
 
     @cached_property
     def task_class(self) -> Any:
@@ -73,7 +69,7 @@ class Scenario(fields.Section):
 
     @property
     def max_obstacles(self) -> int:
-        """Most obstacles that a world of this scenario can hold."""
+        """Largest number of obstacles in a world of this scenario."""
         drawn = self.task_class.sizes(self).get("obstacle")
         return drawn or (self.random_field.obstacles[1] if self.random_field else len(self.obstacles))
 
@@ -85,11 +81,11 @@ class Scenario(fields.Section):
 
     @property
     def max_eddies(self) -> int:
-        """Most eddies that a world of this scenario can hold."""
+        """Largest number of eddies in a world of this scenario."""
         if self.random_field is None:
             north, east = zip(*self.trajectory.waypoints_m or (), strict=True)
             return self.current.num_eddies(max(north) - min(north), max(east) - min(east))
-        # The sides of a box add up to the way through it at most times the root of 2.
+        # The sides of a box sum to at most root 2 times the path through it.
         side = self.random_field.legs[1] * self.random_field.leg_length_m[1] / math.sqrt(2.0)
         return self.current.num_eddies(side, side)
 
@@ -105,8 +101,8 @@ class Scenario(fields.Section):
         _check_faults(self)
         if self.max_eddies > MAX_EDDIES:
             raise ValueError(
-                f"current.eddies = {self.current.eddies} makes {self.max_eddies:,} eddies around this course; at most "
-                f"{MAX_EDDIES:,} are possible: lower it or shorten the course"
+                f"current.eddies = {self.current.eddies} makes {self.max_eddies:,} eddies around this map; at most "
+                f"{MAX_EDDIES:,} are possible: lower it or shorten the trajectory"
             )
         check_vehicle(self.vehicle, self.actuators, self.timing, self.start.speed_max_mps)
         _check_mismatch(self)
@@ -136,7 +132,7 @@ def _check_start(scenario: Scenario) -> None:
 
 
 def _check_map(scenario: Scenario) -> None:
-    """One trajectory, and no obstacle on its start or end."""
+    """The trajectory is unique, and no obstacle is on its start or end."""
     points, clear = scenario.trajectory.waypoints_m, scenario.constraints.s_o_m
     if (points is None) == (scenario.random_field is None):
         raise ValueError(
@@ -158,7 +154,7 @@ def _check_map(scenario: Scenario) -> None:
 
 
 def _check_traffic(scenario: Scenario) -> None:
-    """Obstacles that move have room to turn in, open no walls, and keep off the trajectory's end."""
+    """Moving obstacles can turn, open no walls, and keep off the trajectory's end."""
     traffic = scenario.traffic
     if not traffic.moves:
         return
@@ -170,8 +166,8 @@ def _check_traffic(scenario: Scenario) -> None:
     least = traffic.speed_mps * scenario.timing.control_step_s
     if traffic.amplitude_m < least:
         raise ValueError(
-            f"traffic.amplitude_m must be at least {least:g}, which traffic.speed_mps = {traffic.speed_mps:g} makes in a "
-            f"control hold, got {traffic.amplitude_m:g}; raise it or lower the speed"
+            f"traffic.amplitude_m must be at least {least:g}, the distance at traffic.speed_mps = "
+            f"{traffic.speed_mps:g} in a control step, got {traffic.amplitude_m:g}; raise it or lower the speed"
         )
     most = math.inf if scenario.random_field is None else scenario.random_field.end_clear_m - scenario.constraints.s_o_m
     if traffic.amplitude_m > most:
@@ -182,7 +178,7 @@ def _check_traffic(scenario: Scenario) -> None:
 
 
 def _check_losses(scenario: Scenario) -> None:
-    """Somebody is left."""
+    """At least one vehicle remains."""
     losses, n = len(scenario.losses.times_s), scenario.swarm.num_vehicles
     members = sum(math.ceil(fault.share * n - 1e-9) for fault in scenario.faults if fault.kind == "member")
     if losses + members >= n:
@@ -194,7 +190,7 @@ def _check_losses(scenario: Scenario) -> None:
 
 
 def _check_times(scenario: Scenario) -> None:
-    """Decisions that an episode has room for, and that are soon computed."""
+    """Decisions fit into an episode and can be computed quickly."""
     timing, field = scenario.timing, scenario.random_field
     duration = scenario.trajectory.duration_s
     if field is not None:
@@ -217,33 +213,33 @@ def _check_times(scenario: Scenario) -> None:
 
 
 def _check_sonar(scenario: Scenario) -> None:
-    """Readings come no faster than sound travels, and no more are kept than there is room for."""
+    """Readings are no faster than sound, and no more are stored than fit."""
     latency = scenario.latency
     far = max((array.range_m for array in scenario.sonar.arrays if array.kind == "active"), default=0.0)
     least = 2.0 * far / latency.sound_speed_mps
     if 0.0 < latency.active_period_s < least:
         raise ValueError(
             f"latency.active_period_s must be at least {least:.4g}, in which sound returns from the active arrays' "
-            f"range of {far:g} m, or 0 (at every control hold), got {latency.active_period_s:g}"
+            f"range of {far:g} m, or 0 (at every control step), got {latency.active_period_s:g}"
         )
     readings = latency.processing_s / scenario.timing.control_step_s
     if readings > MAX_READINGS:
         raise ValueError(
-            f"latency.processing_s = {latency.processing_s:g} is {readings:,.0f} control holds; at most {MAX_READINGS} "
+            f"latency.processing_s = {latency.processing_s:g} is {readings:,.0f} control steps; at most {MAX_READINGS} "
             "readings are kept: lower it or raise timing.control_step_s"
         )
     longest = max(array.range_m for array in scenario.sonar.arrays)
     past = longest / latency.sound_speed_mps / scenario.timing.control_step_s
     if latency.travel_time and past > MAX_PAST:
         raise ValueError(
-            f"latency.sound_speed_mps = {latency.sound_speed_mps:g} takes sound {past:,.0f} control holds across the "
+            f"latency.sound_speed_mps = {latency.sound_speed_mps:g} takes sound {past:,.0f} control steps across the "
             f"longest range of {longest:g} m; positions of at most {MAX_PAST:,} are kept: raise it or "
             "timing.control_step_s, or set latency.travel_time = false"
         )
 
 
 def _check_faults(scenario: Scenario) -> None:
-    """Faults name arrays that there are."""
+    """Faults name existing arrays."""
     names = [array.name for array in scenario.sonar.arrays]
     for k, fault in enumerate(scenario.faults):
         if fault.array is not None and fault.array not in names:
@@ -251,7 +247,7 @@ def _check_faults(scenario: Scenario) -> None:
 
 
 def _check_speed(scenario: Scenario) -> None:
-    """L(t) is no faster than a vehicle with a rudder, which would never come back to it; others are warned of."""
+    """A vehicle with a rudder can follow l(t), to which it would never return; for others a warning is logged."""
     speed, most = scenario.trajectory.speed_mps, top_speed(scenario.vehicle, scenario.actuators)
     if speed <= most:
         return
@@ -267,7 +263,7 @@ def _check_speed(scenario: Scenario) -> None:
 
 
 def _check_mismatch(scenario: Scenario) -> None:
-    """The simulation can follow whatever is drawn: what is lightest, braked hardest and pushed most moves fastest."""
+    """The simulation can follow all sampled vehicles: the lightest, with most resistance and thrust, is the fastest."""
     most, limits = scenario.mismatch, scenario.actuators
     if not any((most.mass, most.added_mass, most.drag, most.thrust)):
         return
@@ -289,7 +285,7 @@ def _check_mismatch(scenario: Scenario) -> None:
 
 @cache
 def warn_of_speed(speed_mps: float) -> None:
-    """Say once that no vehicle can follow l(t)."""
+    """Warn once that no vehicle can follow l(t)."""
     text = (
         "trajectory.speed_mps = %g is more than a vehicle holds at full force (actuators.max_force_n): none can follow"
     )

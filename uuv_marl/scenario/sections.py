@@ -1,7 +1,4 @@
-"""What a scenario's swarm does and what is measured, as sections, in SI units and degrees.
-
-A section has fields with ranges, and says what they demand of each other.
-"""
+"""Mission and measurement of a scenario's swarm, as sections, in SI units and degrees."""
 
 import math
 from itertools import pairwise
@@ -12,15 +9,12 @@ from pydantic import Field
 from uuv_marl.scenario.fields import Clock, NonNegative, Positive, Radius, Section, Signed, Speed, within
 from uuv_marl.types import Float64
 
-NOMINAL_VEHICLES = 54
-"""The paper's swarm; areas grow with sqrt(n / 54) above it, so that the density stays."""
+NOMINAL_VEHICLES = 54  # the paper's swarm; areas grow with sqrt(n / 54) above it, which keeps the density
 
-Seconds = TypeVar("Seconds", float, Float64)
-"""A time or an array of times [s]."""
+Seconds = TypeVar("Seconds", float, Float64)  # a time or an array of times [s]
 Legs = Annotated[int, within(1, 8)]
 Discs = Annotated[int, within(0, 64)]
-Point = tuple[float, float]
-"""North and east [m]."""
+Point = tuple[float, float]  # north and east [m]
 
 
 def growth(num_vehicles: int) -> float:
@@ -29,7 +23,7 @@ def growth(num_vehicles: int) -> float:
 
 
 class SwarmSize(Section):
-    """The size of the swarm."""
+    """Size of the swarm."""
 
     num_vehicles: Annotated[int, within(1, 16_384)]
     """Vehicles at the start."""
@@ -47,7 +41,7 @@ class Start(Section):
     spacing_m: Positive
     """Smallest distance between two vehicles at the start."""
     speed_min_mps: Speed
-    """Lowest initial surge speed. Speeds and headings are drawn uniformly."""
+    """Lowest initial surge speed. Speeds and headings are uniform."""
     speed_max_mps: Speed
     """Highest initial surge speed."""
 
@@ -66,11 +60,7 @@ class Start(Section):
     def distance(self, num_vehicles: int, first: Point, second: Point, point: Point) -> float:
         """Distance [m] of a point from the rectangle around both start rectangles, 0 inside.
 
-        Args:
-            num_vehicles: size of the swarm, which the rectangles grow with.
-            first: start of the trajectory's first leg, north and east [m].
-            second: end of that leg, north and east [m].
-            point: the point, north and east [m].
+        ``first`` and ``second`` are the ends of the trajectory's first leg; all points are north and east [m].
         """
         length, width = self.sides(num_vehicles)
         leg = math.dist(first, second)
@@ -94,11 +84,11 @@ class Trajectory(Section):
     speed_mps: Annotated[float, within(0.01, 100)]
     """Speed along the polyline."""
     waypoints_m: Annotated[tuple[tuple[Signed, Signed], ...], Field(min_length=2, max_length=1024)] | None = None
-    """North and east of each corner; absent where ``random_field`` draws the corners."""
+    """North and east of each corner; absent where ``random_field`` samples the corners."""
 
     @property
     def duration_s(self) -> float:
-        """Time to the end of the fixed polyline; the bound on any task time."""
+        """Time to the end of the fixed polyline."""
         points = self.waypoints_m or ()
         return sum(math.dist(a, b) for a, b in pairwise(points)) / self.speed_mps
 
@@ -118,7 +108,7 @@ class Obstacle(Section):
 
 
 class RandomField(Section):
-    """Distribution of trajectories and obstacles, one draw per episode."""
+    """Distribution of trajectories and obstacles, sampled once per episode."""
 
     legs: tuple[Legs, Legs]
     """Fewest and most legs."""
@@ -127,7 +117,7 @@ class RandomField(Section):
     turn_max_deg: Annotated[float, within(0, 150)]
     """Sharpest turn between legs."""
     obstacles: tuple[Discs, Discs]
-    """Fewest and most obstacles; a field without room for them has fewer."""
+    """Fewest and most obstacles; a field too small for them has fewer."""
     radius_m: tuple[Radius, Radius]
     """Smallest and largest radius."""
     offset_max_m: NonNegative
@@ -143,26 +133,27 @@ class RandomField(Section):
 
 
 class Timing(Section):
-    """Three clocks."""
+    """Control step, integration step and decision period."""
 
     control_step_s: Clock
-    """t_r: time for which body forces are held."""
+    """t_r: time for which body forces are constant."""
     integration_step_s: Clock
-    """Runge-Kutta step, of which the control hold is a multiple."""
+    """Runge-Kutta step, of which the control step is a multiple."""
     decision_period_s: Clock
-    """Time between two decisions, a multiple of the control hold; meanwhile the force is held in the world frame."""
+    """Time between two decisions, a multiple of the control step; meanwhile the force is constant in the world
+    frame."""
     fixed: bool
-    """Whether the decision period and the inner loop (``actuators.yaw_damping_nms``) are the scenario's, for every
-    policy alike; if not, a policy is granted what it declares of them."""
+    """Whether decision period and inner loop (``actuators.yaw_damping_nms``) are the scenario's for every policy,
+    instead of those that a policy requires."""
 
     @property
     def control_steps_per_decision(self) -> int:
-        """Control holds in a decision period."""
+        """Control steps in a decision period."""
         return round(self.decision_period_s / self.control_step_s)
 
     @property
     def integration_steps_per_control_step(self) -> int:
-        """Integration steps in a control hold."""
+        """Integration steps in a control step."""
         return round(self.control_step_s / self.integration_step_s)
 
     def _check(self) -> None:
@@ -187,23 +178,23 @@ class Constraints(Section):
 
 
 class Collision(Section):
-    """What counts as a collision: two hulls, or a hull and an obstacle, overlap."""
+    """Definition of a collision: two hulls, or a hull and an obstacle, overlap."""
 
     hull_radius_m: Positive
     """Vehicles collide when their centres are closer than twice this; with an obstacle at this surface distance."""
     ends_vehicle: bool
-    """Whether a vehicle that collides is lost."""
+    """Whether a vehicle is lost by a collision."""
     stops: bool
-    """Whether a hull stops at what it meets, with no velocity into it; if not, it passes through."""
+    """Whether a hull stops at an obstacle or another hull, without velocity into it; if not, it passes through."""
 
 
 class Arrival(Section):
-    """When the task is done: at rest at the trajectory's end, or in passage, for hulls that can't stop."""
+    """End of the task: at rest at the trajectory's end, or in passage, for hulls that can't stop."""
 
     criterion: Literal["rest", "passage"] = "rest"
     """In passage l(t) continues along the last leg beyond the end. The swarm has arrived once l(t) and the swarm's
     centre have crossed the line through the end across that leg, with every vehicle within ``spread_m`` of the centre's
-    place along the leg. ``radius_m`` and ``dwell_s`` have no effect then."""
+    position along the leg. ``radius_m`` and ``dwell_s`` then have no effect."""
     radius_m: Positive
     """At rest: largest distance of the swarm's centre from the end of the trajectory, where l(t) rests."""
     dwell_s: Annotated[float, within(0, 3_600)]
@@ -223,7 +214,7 @@ class TimeLimit(Section):
     """Time added to it."""
 
     def of(self, duration_s: Seconds) -> Seconds:
-        """The limit [s] of trajectories that take so long [s], a number or an array."""
+        """Time limit [s] for trajectories of this duration [s], a number or an array."""
         return self.factor * duration_s + self.extra_s
 
 
@@ -231,7 +222,7 @@ class Losses(Section):
     """Losses of vehicles at set times."""
 
     times_s: Annotated[tuple[NonNegative, ...], Field(max_length=16384)]
-    """At each of these times a vehicle, drawn by the seed, is lost."""
+    """At each of these times a random vehicle is lost."""
 
     def _check(self) -> None:
         if list(self.times_s) != sorted(self.times_s):
@@ -248,6 +239,6 @@ class Reward(Section):
     collision: NonNegative
     arrival: NonNegative
     progress_m: Positive
-    """Way towards the reference that pays 1, in the dense reward."""
+    """Progress towards the reference that is rewarded with 1, in the dense reward."""
     progress_far_m: Positive
-    """Distance from the reference from which on nearing it pays nothing, in the dense reward."""
+    """Distance from the reference beyond which progress is not rewarded, in the dense reward."""

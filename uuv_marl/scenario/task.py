@@ -1,4 +1,4 @@
-"""Which task a scenario asks for, and the task's own numbers; ``uuv_marl.tasks`` holds the tasks."""
+"""Task of a scenario and the task's own numbers; ``uuv_marl.tasks`` holds the tasks."""
 
 from typing import Any, cast
 
@@ -8,10 +8,11 @@ from uuv_marl.errors import ScenarioError, hint
 from uuv_marl.modules import named_object
 from uuv_marl.scenario.fields import Section
 from uuv_marl.scenario.hardware import CHANNEL_NAMES
+from uuv_marl.scenario.messages import explain
 
 
 class TaskSettings(Section):
-    """The task: its name, and numbers of its own, which its class checks."""
+    """The task: its name, and numbers of its own, which its class validates."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -20,27 +21,27 @@ class TaskSettings(Section):
 
 
 def named_task(value: Any) -> Any:
-    """A table with a task's name, where the name alone was given."""
+    """A table with a task's name, if only the name is given."""
     return {"name": value} if isinstance(value, str) else value
 
 
 def shipped_tasks() -> dict[str, str]:
-    """Where the class of each shipped task is, by its name. Raises nothing, and imports no task."""
+    """Module and class of each shipped task, by its name, without importing a task."""
     return cast(dict[str, str], named_object("uuv_marl.tasks:TASKS"))
 
 
 def check_task(task: TaskSettings) -> None:
-    """Raise ScenarioError for what is no task, or has numbers that can't be.
+    """Raise ScenarioError for an unknown task or invalid numbers.
 
-    A shipped task without numbers is taken at its word until a swarm is made, so that reading a scenario does not
-    import the simulation.
+    A shipped task without numbers is not checked until a swarm is made, so that reading a scenario does not import the
+    simulation.
     """
     if task.model_extra or task.name not in shipped_tasks():
         task_numbers(task)
 
 
 def check_channels(task: TaskSettings, channels: tuple[str, ...]) -> None:
-    """Raise ScenarioError for a channel that neither every task knows nor this one; only then it is imported."""
+    """Raise ScenarioError for a channel that is neither common to all tasks nor the task's own."""
     for channel in channels:
         if channel not in CHANNEL_NAMES and channel not in (own := task_class(task.name).channels):
             having = [name for name in shipped_tasks() if channel in task_class(name).channels]
@@ -51,11 +52,7 @@ def check_channels(task: TaskSettings, channels: tuple[str, ...]) -> None:
 
 
 def task_class(name: str) -> Any:
-    """The class of a task, by its name.
-
-    Raises:
-        ScenarioError: there is none, and the message gives the most similar name; or it can't be a task.
-    """
+    """The class of a task, by its name. Raises ScenarioError if it is unknown or invalid."""
     tasks = shipped_tasks()
     if name not in tasks and ":" not in name:
         raise ScenarioError(
@@ -73,24 +70,9 @@ def task_class(name: str) -> Any:
 
 
 def task_numbers(task: TaskSettings) -> Any:
-    """The task's own numbers, checked by its class.
-
-    Raises:
-        ScenarioError: a number is unknown or out of its range; the message names it, its value and the remedy.
-    """
+    """The task's own numbers, validated by its class. Raises ScenarioError for an unknown or invalid number."""
     numbers = task_class(task.name).Numbers
     try:
         return numbers.model_validate(task.model_extra or {})
     except ValidationError as error:
-        first = error.errors()[0]
-        field = ".".join(map(str, ("task", *first["loc"])))
-        if first["type"] == "extra_forbidden":
-            fields = ", ".join(numbers.model_fields) or "none of its own"
-            raise ScenarioError(f"{field} is unknown; the numbers of task {task.name!r} are {fields}") from None
-        if "ctx" in first and first["type"] == "value_error":
-            reason = str(first["ctx"]["error"])
-            raise ScenarioError(f"{field} {reason}" if first["loc"] else reason) from None
-        if first["type"] == "missing" and len(first["loc"]) == 1:
-            reason = f"a task by name takes it as in {{'name': {task.name!r}, '{first['loc'][-1]}': ...}}"
-            raise ScenarioError(f"{field} is missing; {reason}") from None
-        raise ScenarioError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}") from None
+        raise ScenarioError(explain(error, task.model_extra, numbers, "task.")) from None

@@ -13,10 +13,10 @@ _STEPS, _STEP_S, _SMALL = 600, 0.2, 1e-6
 
 @lru_cache(maxsize=256)
 def turning_radius(vehicle: Vehicle, actuators: Actuators, speed_mps: float) -> float:
-    """Radius [m] of the turn at full rudder, the surge speed [m/s] held; 0 if it turns on the spot by a torque.
+    """Radius [m] of the turn at full rudder and constant surge speed [m/s]; 0 for a vehicle without rudder.
 
-    Sway and yaw of Eq. 2 with lift and rudder, from a straight way to where they are steady. Time steps are implicit,
-    so that two minutes take few of them, however stiff the hull.
+    Sway and yaw of Eq. 2 with lift and rudder, from straight motion to the steady state. Time steps are implicit, so
+    that two minutes take few of them, however stiff the hull.
     """
     if actuators.kind == "force_torque":
         return 0.0

@@ -1,4 +1,4 @@
-"""Checks that a vehicle is physical: inertia is positive, damping and lift take energy, no motion is too fast.
+"""Checks that a vehicle is physical: positive inertia, dissipative damping and lift, motion that can be integrated.
 
 Every message names the field, its value and the remedy.
 """
@@ -12,23 +12,16 @@ from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.sections import Timing
 from uuv_marl.types import Float64
 
-RK4_LIMIT = 2.78
-"""Classical Runge-Kutta is stable on the negative real axis up to this product of rate and step."""
-TRIAL_STEPS, RUNS = 600, 128
-"""A vehicle is tried for so many integration steps, a minute at the paper's step."""
-RUNAWAY = 1e8
-"""A speed [m/s, rad/s] beyond which a trial has diverged; none comes near it that does not."""
-SAMPLED_LIMIT = 2.0
-"""A sampled damping loop overshoots without end above this product of rate and hold."""
+RK4_LIMIT = 2.78  # classical Runge-Kutta is stable on the negative real axis up to this product of rate and step
+TRIAL_STEPS, RUNS = 600, 128  # integration steps of a trial, a minute at the paper's step, and parallel runs
+RUNAWAY = 1e8  # speed [m/s, rad/s] beyond which a trial has diverged, never reached otherwise
+SAMPLED_LIMIT = 2.0  # a sampled damping loop diverges above this product of rate and control step
 
 
 def check_vehicle(vehicle: Vehicle, actuators: Actuators, timing: Timing, speed_mps: float) -> None:
-    """Refuse a vehicle that is no passive body, or that the simulation can't follow.
+    """Raise ValueError for a vehicle that is not passive or that the simulation can't follow.
 
-    ``speed_mps``: the highest surge speed at the start.
-
-    Raises:
-        ValueError: names the field, the value and the remedy.
+    ``speed_mps``: the highest initial surge speed.
     """
     inertia = inertia_matrix(vehicle)
     if np.linalg.eigvalsh(inertia)[0] <= 0:
@@ -42,18 +35,18 @@ def check_vehicle(vehicle: Vehicle, actuators: Actuators, timing: Timing, speed_
     damping, control_step_s = actuators.yaw_damping_nms, timing.control_step_s
     if not damping / inertia[2, 2] * control_step_s < SAMPLED_LIMIT:
         raise ValueError(
-            f"actuators.yaw_damping_nms = {damping:g} is unstable when held for timing.control_step_s = {control_step_s:g}; "
+            f"actuators.yaw_damping_nms = {damping:g} is unstable with timing.control_step_s = {control_step_s:g}; "
             f"use less than {SAMPLED_LIMIT * inertia[2, 2] / control_step_s:.4g}"
         )
 
 
 def top_speed(vehicle: Vehicle, actuators: Actuators) -> float:
-    """Surge speed [m/s] that a vehicle holds at full force."""
+    """Surge speed [m/s] of a vehicle at full force."""
     return _terminal(vehicle.X_u, vehicle.X_uu, actuators.max_force_n)
 
 
 def _terminal(linear: float, quadratic: float, force: float) -> float:
-    """Speed at which linear plus quadratic resistance equals the force, with its sign."""
+    """Signed speed at which linear plus quadratic resistance equals the force."""
     return 2 * force / (linear + math.sqrt(linear**2 + 4 * quadratic * abs(force))) if force else 0.0
 
 
@@ -64,7 +57,7 @@ def inertia_matrix(p: Vehicle) -> Float64:
 
 
 def _check_damping(p: Vehicle) -> None:
-    """Nu . D(nu) nu >= 0 for every nu, linear and non-linear part each; surge and yaw rate are bounded."""
+    """Damping is dissipative, its linear and non-linear part each; surge and yaw rate are bounded."""
     if (p.Y_r + p.N_v) ** 2 > 4 * p.Y_v * p.N_r:
         raise ValueError(
             f"vehicle.Y_r + vehicle.N_v = {p.Y_r + p.N_v:g} lets linear damping add energy; "
@@ -91,7 +84,7 @@ def _check_damping(p: Vehicle) -> None:
 
 
 def _least_power(p: Vehicle) -> float:
-    """The least that quadratic sway and yaw damping take, over |r|^3, for all ratios v / r; -inf without a bound."""
+    """Least power of quadratic sway and yaw damping, over |r|^3, for all ratios v / r; -inf without a bound."""
     if p.Y_vv == 0.0:
         return -math.inf  # -N_vv s^2 is more than all else for some sign of v and large s = |v / r|
     least = p.N_rr
@@ -103,9 +96,9 @@ def _least_power(p: Vehicle) -> float:
 
 
 def _check_lift(p: Vehicle) -> None:
-    """Lift of body and fins takes energy from sway and yaw: -(Y_uv v^2 + (Y_ur + N_uv) v r + N_ur r^2) u >= 0.
+    """Lift of body and fins is dissipative: -(Y_uv v^2 + (Y_ur + N_uv) v r + N_ur r^2) u >= 0.
 
-    A fin's lift does, wherever it is. Where C(nu) leaves the added masses out, the coefficients may hold their part.
+    A fin's lift is, wherever the fin is. Where C(nu) omits the added masses, the coefficients may contain their part.
     """
 
     def takes(y_uv: float, y_ur: float, n_uv: float, n_ur: float) -> bool:
@@ -124,13 +117,7 @@ def _check_lift(p: Vehicle) -> None:
 
 
 def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float) -> None:
-    """Refuse an integration step with which Runge-Kutta can't follow the fastest motion.
-
-    That is judged by the motion's damping rate, and in a trial.
-
-    Raises:
-        ValueError: names the field, the value and the remedy.
-    """
+    """Raise ValueError for an integration step too long for the fastest motion, by its damping rate and a trial."""
     h = timing.integration_step_s
     if not can_follow(p, limits, speed_mps, h):
         shorter = [step for k in range(1, 16) if (step := timing.control_step_s / 2**k) < h]
@@ -155,7 +142,7 @@ def can_follow(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) -
 
 
 def _damping_rate(p: Vehicle, limits: Actuators, speed_mps: float) -> float:
-    """How fast [1/s] damping acts at the largest speeds that full force and torque can hold, or at the start."""
+    """Damping rate [1/s] at the largest speeds under full force and torque, or at the start."""
     u = max(top_speed(p, limits), speed_mps)
     r = _terminal(p.N_r, p.N_rr, _most_moment(limits, u))
     sway = [p.Y_v + 2 * p.Y_vv * u - p.Y_uv * u, -p.Y_r - 2 * p.Y_rr * r - p.Y_ur * u]
@@ -165,7 +152,7 @@ def _damping_rate(p: Vehicle, limits: Actuators, speed_mps: float) -> float:
 
 
 def _most_moment(limits: Actuators, speed_mps: float) -> float:
-    """The largest yaw moment [N m] that steers a vehicle at a speed ahead [m/s]."""
+    """Largest steering yaw moment [N m] at a speed ahead [m/s]."""
     if limits.kind == "force_torque":
         return limits.max_torque_nm
     return limits.rudder[1] * math.radians(limits.rudder_max_deg) * speed_mps**2
@@ -173,7 +160,7 @@ def _most_moment(limits: Actuators, speed_mps: float) -> float:
 
 @lru_cache(maxsize=1024)
 def _diverges(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) -> bool:
-    """Whether Runge-Kutta runs away somewhere: a trial of Eq. 2 at full action, held and switched."""
+    """Whether Runge-Kutta diverges in a trial of Eq. 2 at full action, constant and switched."""
     inverse = np.linalg.inv(inertia_matrix(p))
     motion = inverse @ resistance(p)
     thrust, steer = _pushes(limits)
@@ -221,7 +208,7 @@ def resistance(p: Vehicle) -> Float64:
 
 
 def _pushes(limits: Actuators) -> tuple[Float64, Float64]:
-    """Thrust, and torque or rudder, of all trials, shape (step, run); 16 are held, others redrawn after 1 to 100."""
+    """Thrust, and torque or rudder, of all trials, shape (step, run); 16 constant, others for 1 to 100 steps."""
     runs, every = np.arange(RUNS), np.resize([1, 2, 5, 20, 100], RUNS)
     every[:16] = TRIAL_STEPS
     drawn = np.random.default_rng(0).integers(0, 16, (TRIAL_STEPS, RUNS))

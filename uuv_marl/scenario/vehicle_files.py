@@ -1,4 +1,4 @@
-"""Vehicles from names and TOML files, and the variants that a file has where sources disagree."""
+"""Vehicles from names and TOML files, and the variants of a file where sources disagree."""
 
 from pathlib import Path
 from typing import Any, cast
@@ -20,38 +20,31 @@ _OPTIONAL: dict[str, dict[str, Any]] = {
     section: {name: field.default for name, field in model.model_fields.items() if not field.is_required()}
     for section, model in (("vehicle", Vehicle), ("actuators", Actuators))
 }
+"""Defaults of the fields that a vehicle's file may omit, independent of the previous vehicle."""
 _OPTIONAL["actuators"] |= {"thrust_lag_s": 0.0, "yaw_lag_s": 0.0}
 """What a vehicle's file may leave out, and what it is then, whatever vehicle there was before."""
 
 
 def vehicle_names() -> list[str]:
-    """Names of the vehicles that ship with the package."""
+    """Names of the shipped vehicles."""
     return sorted(path.stem for path in VEHICLES.glob("*.toml"))
 
 
 def load_vehicle(name: str) -> dict[str, dict[str, Any]]:
-    """A vehicle's sections ``vehicle`` and ``actuators``, by name or TOML file, or a variant: ``remus100+munk_on``.
+    """Sections ``vehicle`` and ``actuators`` of a vehicle by name, TOML file or variant (``remus100+munk_on``).
 
-    Raises:
-        ScenarioError: there is no such vehicle or variant, or its file is broken.
+    Raises ScenarioError if the vehicle or variant is unknown, or the file is invalid.
     """
     return vehicle_file(name).data
 
 
 def variant_names(vehicle: str) -> list[str]:
-    """Variants that a vehicle's file has: other numbers where sources disagree. ``vehicle`` as for ``load_vehicle``."""
+    """Variants of a vehicle's file: other numbers where sources disagree. ``vehicle`` as for ``load_vehicle``."""
     return sorted(read_toml(_find_vehicle(_without_variants(vehicle)[0])).data.get("variants", {}))
 
 
 def show_vehicle(name: str) -> str:
-    """A vehicle's file, with the source of every number; where variants are named, with theirs.
-
-    Args:
-        name: as for ``load_vehicle``.
-
-    Raises:
-        ScenarioError: there is no such vehicle or variant, or its file is broken.
-    """
+    """A vehicle's file, with the source of every number, of named variants too. ``name`` as for ``load_vehicle``."""
     file = vehicle_file(name)
     document = tomlkit.parse(file.text)
     if file.variants:
@@ -68,7 +61,7 @@ def show_vehicle(name: str) -> str:
 
 
 def vehicle_file(name: str, beside: Path | None = None) -> File:
-    """A vehicle's file, which must be complete: numbers of two vehicles are never mixed without a word."""
+    """A vehicle's file, which must be complete, so that numbers of two vehicles are never mixed."""
     plain, chosen = _without_variants(name)
     file = read_toml(_find_vehicle(plain, beside))
     for section, fields in _FIELDS_BY_SECTION.items():
@@ -91,14 +84,14 @@ def vehicle_file(name: str, beside: Path | None = None) -> File:
 
 
 def left_out(vehicle: object) -> dict[str, Any] | None:
-    """What a whole vehicle may leave out, and what it is then; None for a table with only some numbers of a vehicle."""
+    """Defaults of a complete vehicle's omitted fields; None for a table with only some numbers of a vehicle."""
     needed = _FIELDS_BY_SECTION["vehicle"] - _OPTIONAL["vehicle"].keys()
     whole = isinstance(vehicle, dict) and needed <= cast(dict[str, Any], vehicle).keys()
     return dict(_OPTIONAL["vehicle"]) if whole else None
 
 
 def _variant(file: File, name: str) -> dict[str, Any]:
-    """What a variant of a vehicle changes."""
+    """Changes by a variant of a vehicle."""
     every = file.data.get("variants", {})
     variants = cast(dict[str, Any], every) if isinstance(every, dict) else {}
     changes = variants.get(name)
@@ -114,13 +107,13 @@ def _variant(file: File, name: str) -> dict[str, Any]:
     other = next((key for key in cast(dict[str, Any], changes) if key not in _FIELDS_BY_SECTION), None)
     if other is not None:
         raise ScenarioError(
-            f"vehicle {file.path}: variants.{short(name)} holds {shown(other)}; it may hold vehicle and actuators only"
+            f"vehicle {file.path}: variants.{short(name)} holds {shown(other)}; it may hold only vehicle and actuators"
         )
     return cast(dict[str, Any], changes)
 
 
 def _without_variants(name: str) -> tuple[str, list[str]]:
-    """A vehicle's name or file, and the variants that follow it: a plus before each."""
+    """A vehicle's name or file, and the variants that follow it, each after a plus."""
     file, toml, after = name.rpartition(".toml")
     if toml and (not after or after.startswith("+")):
         return file + toml, after.split("+")[1:]
@@ -133,13 +126,13 @@ def _find_vehicle(name: str, beside: Path | None = None) -> Path:
     if name in vehicle_names() or (name.endswith(".toml") and path.is_file()):
         return path
     raise ScenarioError(
-        f"vehicle {shown(name)} is unknown; {hint(name, vehicle_names())}give one of {', '.join(vehicle_names())}, or a "
-        "path ending in .toml"
+        f"vehicle {shown(name)} is unknown; {hint(name, vehicle_names())}give one of {', '.join(vehicle_names())}, "
+        "or a path ending in .toml"
     )
 
 
 def variant_comments(file: "File") -> dict[str, str]:
-    """Comments of what the chosen variants of a vehicle change, by field."""
+    """Comments of the fields that selected variants change, by field."""
     every = dict(items(tomlkit.parse(file.text)))
     return {
         field.removeprefix(f"variants.{name}."): item.trivia.comment

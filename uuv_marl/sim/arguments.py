@@ -1,4 +1,4 @@
-"""What callers hand over, checked once before anything uses it: whole numbers, seeds and actions."""
+"""Checks of arguments: whole numbers, seeds and actions."""
 
 import operator
 import reprlib
@@ -14,10 +14,10 @@ SeedLike = int | Sequence[int | None] | NDArray[np.integer] | None
 
 
 def whole_number(name: str, value: object, least: int) -> int:
-    """``value`` as an int from ``least`` on.
+    """``value`` as an int.
 
     Raises:
-        TypeError: it is no whole number; booleans are none, and 2.0 is none.
+        TypeError: it isn't an integer; booleans and 2.0 are refused.
         ValueError: it is smaller than ``least``.
     """
     message = f"{name} must be a whole number from {least}, got {reprlib.repr(value)}"
@@ -33,11 +33,11 @@ def whole_number(name: str, value: object, least: int) -> int:
 
 
 def world_seeds(seed: SeedLike, worlds: Sequence[int]) -> list[int | None]:
-    """A seed for each of these worlds: ``seed + w``, or the given ones; None where a world's stream goes on.
+    """Seeds of these worlds: ``seed + w``, or the given ones; None where a world's generator continues.
 
     Raises:
-        TypeError: a seed is no whole number.
-        ValueError: a seed is negative, or there is not one for each world.
+        TypeError: a seed isn't an integer.
+        ValueError: a seed is negative, or their number isn't that of the worlds.
     """
     if seed is None:
         return [None] * len(worlds)
@@ -50,16 +50,15 @@ def world_seeds(seed: SeedLike, worlds: Sequence[int]) -> list[int | None]:
 
 
 def action_array(action: ArrayLike, shape: tuple[int, ...], whose: str) -> Float32:
-    """An action as float32 of a shape; not copied where it is that already.
+    """An action as a float32 array, not copied if it is one already.
 
     Args:
-        action: real numbers; whole numbers and float64 are rounded to float32.
-        shape: what it must have.
-        whose: begins the message, such as ``the action of uuv_3``.
+        action: real numbers; integers and float64 are rounded to float32.
+        shape: required shape.
+        whose: subject of the error message, such as ``the action of uuv_3``.
 
     Raises:
-        ValueError: it is complex, text, ragged, masked, too large or anything else that holds no real numbers, is a
-            tensor that NumPy can't read, or has another shape.
+        ValueError: NumPy can't read it as unmasked real numbers, or it has another shape.
     """
     try:
         array, reason = np.asarray(action), ""
@@ -78,5 +77,5 @@ def action_array(action: ArrayLike, shape: tuple[int, ...], whose: str) -> Float
 
 
 def rounding() -> np.errstate:
-    """A block in which numbers are rounded to float32 whatever ``np.seterr`` says: to 0, or to what is infinite."""
+    """Context in which rounding to float32 may underflow or overflow silently, whatever ``np.seterr`` says."""
     return np.errstate(over="ignore", under="ignore")

@@ -1,31 +1,33 @@
-"""Who is where: the living vehicles of a world in the order of square cells, so that near ones lie side by side.
+"""Cell lists: the living vehicles of a world sorted by square cells, so that near ones are contiguous in memory.
 
-Small swarms have one cell, and every vehicle looks at every other. Large ones have a grid over their bounding box, and
-a search visits boxes of cells: in each row of a box the vehicles are neighbours in memory.
+Small swarms have one cell, and every pair is examined. Large ones have a grid over their bounding box, and a search
+visits boxes of cells.
 """
 
 import math
 from typing import NamedTuple
 
-from uuv_marl.sim.compiled import compiled, compiled_inner
+from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
 from uuv_marl.sim.workspace import Cells, Columns
 from uuv_marl.types import Bool
 
 ONE_CELL_UP_TO = 250
-"""Vehicles up to which a look at every pair is faster than a grid (perf/, docs/speed.md)."""
+"""Number of vehicles up to which examining every pair is faster than a grid (perf/, docs/speed.md)."""
 _CELLS_PER_VEHICLE = 4
 _CROWDED = 0.85
-"""Side of a cell over the mean distance in a swarm so crowded that its cells are made smaller."""
+"""Side of a cell over the mean spacing, for swarms so dense that cells are made smaller."""
+Box = tuple[float, float, float, float]
+"""Northern, southern, eastern and western side of a rectangle [m]."""
 
 
 class Grid(NamedTuple):
-    """Where the cells lie."""
+    """Geometry of the cells."""
 
     living: int
     x_min: float
     y_min: float
     side: float
-    """Edge of a cell [m]; infinite for one cell."""
+    """Side of a cell [m]; infinite for one cell."""
     columns: int
     """Cells along y."""
     rows: int
@@ -34,16 +36,13 @@ class Grid(NamedTuple):
 
 @compiled
 def max_cells(num_vehicles: int) -> int:
-    """The most cells that ``sort`` makes."""
+    """Largest number of cells that ``sort`` makes."""
     return 1 if num_vehicles <= ONE_CELL_UP_TO else _CELLS_PER_VEHICLE * num_vehicles
 
 
 @compiled
 def fit(w: int, alive: Bool, side: float, now: Columns) -> Grid:
-    """A grid over the living of a world: cells as wide as asked, smaller in a crowd, wider where there were too many.
-
-    ``side`` is the edge of a cell that is asked for [m].
-    """
+    """Fit a grid over the living of world w; ``side`` is that of a cell [m] unless the swarm is dense or too wide."""
     x, y = now.x, now.y
     living, x_min, x_max, y_min, y_max = 0, math.inf, -math.inf, math.inf, -math.inf
     for i in range(alive.shape[1]):
@@ -65,20 +64,26 @@ def fit(w: int, alive: Bool, side: float, now: Columns) -> Grid:
 
 @compiled
 def place(value: float, low: float, side: float, num: int) -> int:
-    """Row or column that holds a coordinate; the first or last for one beyond the grid, the first for none (NaN).
+    """Index of the row or column that contains a coordinate, clipped to the grid; 0 for NaN.
 
-    ``low``: where the first row or column begins [m]; ``side``: edge of a cell [m]; ``num``: how many there are.
+    ``low``: lower side of the first one [m]; ``side``: of a cell [m]; ``num``: number of rows or columns.
     """
     cell = (value - low) / side
     return int(min(cell, num - 1.0)) if cell > 0.0 else 0
 
 
+@compiled_inline
+def covered(box: Box, grid: Grid) -> tuple[int, int, int, int]:
+    """First and last row, then first and last column, of the cells that meet a rectangle."""
+    north, south, east, west = box
+    bottom, top = place(south, grid.x_min, grid.side, grid.rows), place(north, grid.x_min, grid.side, grid.rows)
+    left, right = place(west, grid.y_min, grid.side, grid.columns), place(east, grid.y_min, grid.side, grid.columns)
+    return bottom, top, left, right
+
+
 @compiled_inner
 def sort(w: int, alive: Bool, side: float, now: Columns, cells: Cells) -> Grid:
-    """Fill ``cells`` with the living of a world, by cell and within a cell by index; where the cells lie.
-
-    ``side`` is that of ``fit``.
-    """
+    """Sort the living of world w into ``cells`` by cell, then by index, and return the grid; ``side`` as in ``fit``."""
     grid, x, y, c, s = fit(w, alive, side, now), now.x, now.y, now.cos, now.sin
     num = grid.rows * grid.columns
     cells.first[: num + 1] = 0
@@ -86,11 +91,8 @@ def sort(w: int, alive: Bool, side: float, now: Columns, cells: Cells) -> Grid:
         if alive[w, i]:
             cell = 0
             if num > 1:
-                row, column = (
-                    place(x[i], grid.x_min, grid.side, grid.rows),
-                    place(y[i], grid.y_min, grid.side, grid.columns),
-                )
-                cell = row * grid.columns + column
+                row = place(x[i], grid.x_min, grid.side, grid.rows)
+                cell = row * grid.columns + place(y[i], grid.y_min, grid.side, grid.columns)
             cells.entry[i] = cell
             cells.first[cell] += 1
         else:

@@ -1,7 +1,7 @@
-"""Numba behind one decorator: compiled code is kept on disk, and never serves old physics.
+"""Decorators that compile with Numba, and the on-disk cache of compiled code.
 
-Each function is kept under a hash of all the code that it can be compiled from (``uuv_marl.sim.sources``), whatever
-checkout or version it belongs to.
+The cache's key is a hash of all the code that a function is compiled from (``uuv_marl.sim.sources``), so that it is
+never out of date.
 """
 
 import contextlib
@@ -27,28 +27,28 @@ from uuv_marl.sim.sources import source_key
 F = TypeVar("F", bound=Callable[..., Any])
 _log = logging.getLogger("uuv_marl")
 _UNUSED_S = 30 * 86400.0
-"""Compiled code that nobody loaded for so long is deleted."""
+"""Compiled code unused for this time is deleted."""
 _QUIET_S = 60.0
-"""One message is enough for functions that are compiled closer together than this."""
+"""Functions compiled within this time of each other share one message."""
 _FOLDER, _MARK = "uuv_marl-compiled", "compiled-by-uuv_marl.txt"
 _WHAT_THIS_IS = "uuv_marl keeps compiled code in this folder. Code that is not used for a month is deleted from it.\n"
 _OURS = re.compile(r".+-[0-9a-f]{16}\.py\d+\w*\.(nbi|\d+\.nbc)(\.tmp\.[0-9a-f]{16})?")
-"""Names that a cache's files have: function, key, Python, number; and those of a write that was cut off."""
+"""File names in the cache: function, key, Python, number; also of an interrupted write."""
 _settings, caching = cast(Any, _config), cast(Any, _caching)
 _last_compiled = -_QUIET_S
 
 
 class Cache(NamedTuple):
-    """Where compiled code is kept."""
+    """Folder of compiled code."""
 
     folder: Path
     writable: bool
-    """False where others have prepared it, as in the image of a container, or where the disk is read-only."""
+    """False where it was prepared by others, as in a container's image, or the disk is read-only."""
 
 
 @functools.cache
 def cache() -> Cache | None:
-    """The cache, in ``UUV_MARL_CACHE_DIR`` or the user's cache folder; None where there can be none."""
+    """The cache, in ``UUV_MARL_CACHE_DIR`` or the user's cache folder; None if it can't be used."""
     folder: Path | str = "of the user"
     try:
         folder = user_path(os.environ.get("UUV_MARL_CACHE_DIR") or platformdirs.user_cache_dir("uuv_marl")) / _FOLDER
@@ -60,7 +60,7 @@ def cache() -> Cache | None:
         return Cache(folder, _can_write(folder))
     except (OSError, RuntimeError) as error:  # RuntimeError: no home folder is known
         _log.warning(
-            "The compile cache %s can't be used (%s), so every start compiles anew, for up to a minute. "
+            "The compile cache %s can't be used (%s), so every start compiles again, for up to a minute. "
             "Set UUV_MARL_CACHE_DIR to a writable folder of your own.",
             folder,
             getattr(error, "strerror", None) or error,
@@ -69,9 +69,9 @@ def cache() -> Cache | None:
 
 
 def _make(folder: Path) -> None:
-    """Make a folder that only its owner may write to, this user or root. Raises OSError where it is another's.
+    """Make a folder that only this user or root may write to, since loading compiled code executes it.
 
-    Loading compiled code executes it; so does starting the Python that root has installed.
+    Raises OSError if it is another's.
     """
     folder.mkdir(parents=True, exist_ok=True, mode=0o755)
     status = folder.stat()
@@ -80,7 +80,7 @@ def _make(folder: Path) -> None:
 
 
 def _claim(folder: Path) -> None:
-    """Make the folder that nobody else keeps files in, marked by a file. Raises OSError where others do."""
+    """Make a folder of the package's own, marked by a file. Raises OSError if it holds other files."""
     _make(folder)
     mark = folder / _MARK
     if mark.exists():
@@ -99,7 +99,7 @@ def _can_write(folder: Path) -> bool:
 
 
 class _Locator(caching._CacheLocator):
-    """Names a function's files in the cache by the code that it is compiled from."""
+    """Numba's locator of a function's files, by the hash of its code."""
 
     def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
         self._py_file = py_file
@@ -124,16 +124,16 @@ class _Implementation(caching.CompileResultCacheImpl):
 
 
 class _Cache(caching.FunctionCache):
-    """Numba's cache of one function, which survives broken files and a full disk, and says when it compiles."""
+    """Numba's cache of one function, which tolerates broken files and a full disk, and logs compilations."""
 
     _impl_class = _Implementation
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was compiled for these types, or None."""
+        """Load the code compiled for these types, or None."""
         index = Path(self._cache_file._index_path)
         try:
             overload: Any = caching.FunctionCache.load_overload(self, sig, target_context)
-        except Exception:  # a file cut off by a power cut raises whatever unpickling meets
+        except Exception:  # a truncated file can raise any error of unpickling
             overload = None
             with contextlib.suppress(OSError):
                 index.unlink(missing_ok=True)
@@ -144,25 +144,25 @@ class _Cache(caching.FunctionCache):
         return overload
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled."""
+        """Save compiled code."""
         if not cast(Cache, cache()).writable:
             return
         try:
             caching.FunctionCache.save_overload(self, sig, data)
         except OSError as error:
-            _log.warning("%s can't be kept (%s), so the next start compiles anew.", self.cache_path, error.strerror)
+            _log.warning("%s can't be kept (%s), so the next start compiles again.", self.cache_path, error.strerror)
             self.disable()
 
 
 def _touch(index: Path) -> None:
-    """Remember that a file was used, once a day."""
+    """Update a file's time of use, once a day."""
     with contextlib.suppress(OSError):
         if time.time() - index.stat().st_mtime > 86400.0:
             os.utime(index)
 
 
 def _announce(place: Cache) -> None:
-    """Say that compiling takes long, and tidy up meanwhile."""
+    """Log that compiling takes long, and delete unused code meanwhile."""
     global _last_compiled  # noqa: PLW0603 - a clock of this process
     if time.monotonic() - _last_compiled > _QUIET_S:
         remaining = "is kept in %s" if place.writable else "can't be kept, since %s can't be written to"
@@ -173,15 +173,11 @@ def _announce(place: Cache) -> None:
 
 
 def prune(folder: Path) -> None:
-    """Delete compiled code that has not been used for a month, also of other versions of Numba.
-
-    Args:
-        folder: the cache's own; without its mark, nothing is deleted.
-    """
+    """Delete compiled code unused for a month, also of other versions of Numba, from a marked folder."""
     if not (folder / _MARK).exists():
         return
     for index in folder.glob("numba-*/*.nbi*"):
-        with contextlib.suppress(OSError):  # another process may tidy up, too; and what is not empty stays
+        with contextlib.suppress(OSError):  # another process may delete, too; folders that are not empty stay
             if _OURS.fullmatch(index.name) and time.time() - index.stat().st_mtime > _UNUSED_S:
                 code = index.parent.glob(f"{glob.escape(index.name.partition('.nbi')[0])}.*.nbc*")
                 for path in (index, *(path for path in code if _OURS.fullmatch(path.name))):
@@ -192,40 +188,39 @@ def prune(folder: Path) -> None:
 @functools.cache
 def _warn_of_missing_sources(package: str) -> None:
     _log.warning(
-        "The sources of %s are not on this disk, so that a change of them would not be seen. So compiled code is not "
-        "kept, and every start compiles anew, for up to a minute; install the package with its .py files.",
+        "The sources of %s are not on this disk, so compiled code is not kept, and every start compiles again, for up "
+        "to a minute; install the package with its .py files.",
         package,
     )
 
 
 def _key(function: Callable[..., Any]) -> str | None:
-    """What a function's compiled code is kept under, None where it can't be."""
+    """Key of a function's compiled code in the cache, None if it can't be kept."""
     return source_key(function.__module__, repr((_settings.BOUNDSCHECK, _settings.OPT, _OPTIONS)))
 
 
-# Without Numba's runtime nothing is allocated, and no array's references are counted: with it, that counting takes more
-# time than the physics, since every call counts every array it is given.
+# Without Numba's runtime (_nrt) no references are counted, which would take longer than the physics.
 _OPTIONS: dict[str, object] = {"error_model": "numpy", "nogil": True, "_nrt": False}
 
 
 def compiled(function: F) -> F:
-    """Compile with Numba on the first call; strict IEEE arithmetic, so that results don't depend on the caller."""
+    """Compile with Numba on the first call; IEEE arithmetic is strict, so that results don't depend on the caller."""
     return _jit(function)
 
 
 def compiled_inline(function: F) -> F:
-    """Compile as ``compiled`` does, but copy the function into its callers, so that loops run on vector registers."""
+    """Compile as ``compiled`` does, but inline the function into its callers, so that loops are vectorised."""
     return _jit(function, forceinline=True)
 
 
 def compiled_inner(function: F) -> F:
-    """As ``compiled``, for compiled callers alone: what takes all arrays of a world compiles faster without a door."""
+    """As ``compiled``, for compiled callers only: functions of many arrays compile faster without Python wrappers."""
     dispatcher = cast(Any, _jit(function, no_cpython_wrapper=True, no_cfunc_wrapper=True))
 
     def refuse(*_args: object, **_names: object) -> None:
         raise TypeError(f"{function.__name__} can be called by compiled code only")
 
-    # A call from Python would run into the missing door; so Numba is never told of one, and asked to open one, refuses.
+    # A call from Python would crash in the missing wrapper, so that it must be refused.
     def ignore(*_args: object) -> None:
         return
 
@@ -233,11 +228,21 @@ def compiled_inner(function: F) -> F:
     return cast(F, dispatcher)
 
 
-def entry(function: F, *arguments: object) -> F:
-    """A ``compiled`` function for arguments of these very types, whose types are not looked up at every call.
+def from_source(name: str, parameters: str, value: str, scope: dict[str, Any]) -> Callable[..., Any]:
+    """A function that returns the value of an expression, to be compiled; ``scope`` holds its module's globals.
 
-    For functions of many arrays, where looking takes as long as a third of a step. Who calls it answers for the types:
-    an array of another type, number of axes or memory layout is not noticed.
+    For expressions made from a declaration, since Numba can't loop over the fields of a NamedTuple.
+    """
+    source, made = f"def {name}({parameters}):\n    return {value}\n", dict[str, Any]()
+    exec(compile(source, scope["__file__"], "exec"), scope, made)  # noqa: S102 - the source is the package's own
+    return made[name]
+
+
+def entry(function: F, *arguments: object) -> F:
+    """A ``compiled`` function for exactly these types of arguments, which a call doesn't check.
+
+    For functions of many arrays, where checking takes up to a third of a step. An array of another type, number of axes
+    or memory layout goes unnoticed.
     """
     dispatcher = cast(Any, function)
     if _settings.DISABLE_JIT:

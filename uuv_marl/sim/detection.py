@@ -1,30 +1,28 @@
-"""Whom a vehicle hears (Eq. 8-9, 12-15): the nearest in each sub-sector, unless an obstacle is between."""
+"""Detections of vehicles (Eq. 8-9, 12-15): the nearest in each sub-sector, unless an obstacle hides it."""
 
 import math
 
 import numpy as np
 
 from uuv_marl.sim.arrays import WorldMap
-from uuv_marl.sim.cells import Grid, place
+from uuv_marl.sim.cells import Box, Grid, covered
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.sonar import SonarSuite, cross, diamond
 from uuv_marl.sim.workspace import Cells, Listener, Workspace
 from uuv_marl.types import Float64, Int64
 
-Box = tuple[float, float, float, float]
-"""Northern, southern, eastern and western side [m]."""
 Points = tuple[Float64, Float64, Int64]
 """North and east [m] and index of vehicles, shape (vehicle,) each."""
 Pose = tuple[float, float, float, float]
 """North and east [m], cosine and sine of the heading."""
 
 _REACH_CELLS = 5.0
-"""Cells searched around a listener before its empty sub-sectors are followed one by one; the fastest of 2.5, 3.5, 5."""
+"""Cells searched around a listener before its empty sub-sectors one by one; the fastest of 2.5, 3.5 and 5."""
 
 
 @compiled_inner
 def hidden(x: float, y: float, dx: float, dy: float, w: int, world_map: WorldMap) -> bool:
-    """Whether an obstacle meets the segment from (x, y) to (x + dx, y + dy)."""
+    """Whether an obstacle intersects the segment from (x, y) to (x + dx, y + dy) [m]."""
     obstacles, length2 = world_map.obstacles, dx * dx + dy * dy
     for k in range(world_map.num_obstacles[w]):
         o_x, o_y = obstacles[w, k, 0] - x, obstacles[w, k, 1] - y
@@ -36,10 +34,9 @@ def hidden(x: float, y: float, dx: float, dy: float, w: int, world_map: WorldMap
 
 @compiled_inline
 def locate(num: int, points: Points, pose: Pose, bins: int, listener: Listener) -> None:
-    """Where points are for a listener; itself nowhere.
+    """Write squared distances, body-frame positions and bins of points, for a listener; its own distance is infinite.
 
-    ``bins``: parts of the full circle of directions, a power of two. Squared distances, places ahead and abeam, and
-    bins are written.
+    ``bins``: number of bins of the full circle of directions, a power of two.
     """
     (xs, ys, _), (x, y, c, s) = points, pose
     per_unit, last = 0.25 * bins, np.int32(bins - 1)
@@ -49,21 +46,19 @@ def locate(num: int, points: Points, pose: Pose, bins: int, listener: Listener) 
         b_x, b_y = c * dx + s * dy, c * dy - s * dx
         listener.squared[q] = squared if squared > 0.0 else math.inf
         listener.ahead[q], listener.abeam[q] = b_x, b_y
-        listener.bin[q] = (
-            np.int32(diamond(b_x, b_y) * per_unit) & last
-        )  # astern is 4 and 0; no direction (NaN) is any bin
+        # Astern is 4 and 0; NaN may give any bin.
+        listener.bin[q] = np.int32(diamond(b_x, b_y) * per_unit) & last
 
 
 @compiled_inline
 def choose_sectors(num: int, layer: int, suite: SonarSuite, listener: Listener) -> None:
-    """The sub-sector of a layer for each of those located. Eq. 12-13.
+    """Find the sub-sector of each located point in a layer, a row of ``suite.codes``; their number is none. Eq. 12-13.
 
-    No branch depends on the positions: a wrongly guessed branch costs more than all the arithmetic here. ``layer`` is a
-    row of ``suite.codes``. The number of all sub-sectors stands for none.
+    No branch depends on the positions, since a mispredicted branch costs more than the arithmetic here.
     """
     none, num_edges = suite.lower.shape[0], 0
     for q in range(num):
-        # Unsigned, since Numba spends longer on the sign of an index than on looking it up.
+        # Unsigned, since Numba checks the sign of an index, which takes longer than the look-up.
         code = suite.codes[layer, np.uintp(listener.bin[q])]
         listener.sector[q], listener.some[num_edges] = code, q
         num_edges += int(code > none)
@@ -76,7 +71,7 @@ def choose_sectors(num: int, layer: int, suite: SonarSuite, listener: Listener) 
 
 @compiled_inline
 def keep_nearest(num: int, vehicles: Int64, listener: Listener) -> None:
-    """Keep the nearest of those located in each sub-sector, the lower index of equals. Eq. 14-15."""
+    """Keep the nearest located point of each sub-sector, the lower index of equal ones. Eq. 14-15."""
     for q in range(num):
         k = np.uintp(listener.sector[q])
         listener.nearest[k] = listener.squared[q] if listener.squared[q] < listener.nearest[k] else listener.nearest[k]
@@ -98,10 +93,7 @@ def keep_nearest(num: int, vehicles: Int64, listener: Listener) -> None:
 def detect_among(
     num: int, points: Points, pose: Pose, w: int, world_map: WorldMap, suite: SonarSuite, listener: Listener
 ) -> None:
-    """A listener hears those of some vehicles that are nearest in a sub-sector, unless an obstacle is between.
-
-    Of the points the first ``num`` count. A nearer one replaces whom the ear has heard so far.
-    """
+    """Update a listener's detections with the first ``num`` of some vehicles, except those that an obstacle hides."""
     locate(num, points, pose, suite.codes.shape[1], listener)
     xs, ys, vehicles = points
     if suite.obstacles_hide and world_map.num_obstacles[w] > 0:
@@ -115,10 +107,8 @@ def detect_among(
 
 @compiled_inner
 def gather(box: Box, cells: Cells, grid: Grid, listener: Listener) -> int:
-    """Collect the entries of the cells that meet a rectangle of the world; how many."""
-    north, south, east, west = box
-    left, right = place(west, grid.y_min, grid.side, grid.columns), place(east, grid.y_min, grid.side, grid.columns)
-    top, bottom = place(north, grid.x_min, grid.side, grid.rows), place(south, grid.x_min, grid.side, grid.rows)
+    """Collect the entries of the cells that meet a rectangle; return how many."""
+    bottom, top, left, right = covered(box, grid)
     num = 0
     for row in range(bottom, top + 1):
         for q in range(cells.first[row * grid.columns + left], cells.first[row * grid.columns + right + 1]):
@@ -129,7 +119,7 @@ def gather(box: Box, cells: Cells, grid: Grid, listener: Listener) -> int:
 
 @compiled_inline
 def clear_listener(listener: Listener) -> None:
-    """Fill the listener with silence."""
+    """Clear the listener's detections."""
     listener.detected_index[:] = -1
     listener.detected_ahead[:] = 0.0
     listener.detected_abeam[:] = 0.0
@@ -137,7 +127,7 @@ def clear_listener(listener: Listener) -> None:
 
 @compiled_inline
 def detect(p: int, w: int, world_map: WorldMap, suite: SonarSuite, workspace: Workspace, grid: Grid) -> None:
-    """Whom one vehicle hears: those around it, then farther out where a sub-sector is empty."""
+    """Detect vehicles for entry p: around it, then farther out where a sub-sector is empty. Eq. 8-9, 12-15."""
     cells, listener, sectors = workspace.cells, workspace.listener, suite.lower.shape[0]
     pose = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
     for k in range(sectors + 1):
@@ -150,7 +140,7 @@ def detect(p: int, w: int, world_map: WorldMap, suite: SonarSuite, workspace: Wo
     reach = _REACH_CELLS * grid.side
     around = pose[0] + reach, pose[0] - reach, pose[1] + reach, pose[1] - reach
     detect_within(around, pose, w, world_map, suite, workspace, grid)
-    for k in range(sectors):  # farther and farther, until nobody nearer can be missed
+    for k in range(sectors):  # outward, until no nearer vehicle can be missed
         near = reach
         while near * near <= listener.nearest[k]:
             detect_within(sector_box(k, near, 1.5 * near, pose, suite), pose, w, world_map, suite, workspace, grid)
@@ -161,7 +151,7 @@ def detect(p: int, w: int, world_map: WorldMap, suite: SonarSuite, workspace: Wo
 def detect_within(
     box: Box, pose: Pose, w: int, world_map: WorldMap, suite: SonarSuite, workspace: Workspace, grid: Grid
 ) -> None:
-    """A listener hears those of a rectangle of the world, as in ``listen``."""
+    """Update a listener's detections with the vehicles in a rectangle."""
     listener = workspace.listener
     num = gather(box, workspace.cells, grid, listener)
     detect_among(num, (listener.x, listener.y, listener.vehicle), pose, w, world_map, suite, listener)
@@ -169,10 +159,10 @@ def detect_within(
 
 @compiled_inner
 def sector_box(k: int, near: float, far: float, pose: Pose, suite: SonarSuite) -> Box:
-    """Rectangle around what a sub-sector hears between two distances, ``near`` and ``far`` [m]."""
+    """Bounding rectangle of a sub-sector between two distances, ``near`` and ``far`` [m]."""
     x, y, c, s = pose
     l_x, l_y, u_x, u_y = suite.lower[k, 0], suite.lower[k, 1], suite.upper[k, 0], suite.upper[k, 1]
-    # The far edges are lengthened so that their chord clears the arc: by 1 / cos of half the width.
+    # Lengthened by 1 / cos of half the width, so that the chord between the far edges lies beyond the arc.
     far *= math.sqrt(2.0 / (1.0 + l_x * u_x + l_y * u_y))
     l_x, l_y, u_x, u_y = c * l_x - s * l_y, s * l_x + c * l_y, c * u_x - s * u_y, s * u_x + c * u_y
     margin = 1e-9 * far  # for rounding

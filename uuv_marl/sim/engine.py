@@ -1,4 +1,4 @@
-"""What advances the worlds of a swarm: the compiled functions, and the threads that share them."""
+"""Engine of a swarm: the compiled functions, and the threads that share the worlds."""
 
 import functools
 from collections.abc import Callable
@@ -17,14 +17,13 @@ from uuv_marl.sim.workspace import workspace_buffers
 from uuv_marl.types import Bool, Float32
 
 _LEAST = 200
-"""Vehicles that a thread must have to be worth waking: that takes as long as moving about as many."""
-
+"""Least number of vehicles per thread: waking one takes as long as moving about as many."""
 _HEAD = 200
-"""Vehicles that are moved while a thread wakes, and some more: the caller, who would have to be woken, ends last."""
+"""Extra vehicles of the calling thread, which moves them while the others wake, and should finish last."""
 
 
 class Engine:
-    """Reads and writes the arrays of ``World`` that it was made with; whatever else it holds, no later run needs.
+    """Advances the arrays of a ``World``; it has no state of its own beyond them.
 
     Few vehicles run in the calling thread; worlds with many are shared among threads.
     """
@@ -49,18 +48,18 @@ class Engine:
         return entry(step_worlds, 0, 0, 0, self._every, action, *self._numbers)
 
     def __getstate__(self) -> dict[str, object]:
-        """All but the doors to compiled code, which belong to this process."""
+        """All but the compiled entry points, which can't be pickled."""
         return {name: value for name, value in vars(self).items() if name not in ("_observe", "_step")}
 
     def observe(self, w: int) -> None:
-        """Facts and percepts of world w from its state and course, as after a reset."""
+        """Compute facts and percepts of world w from its state and map, as after a reset."""
         self._observe(w, *self._numbers)
 
     def step(self, action: Float32, active: Bool | None, on_stepped: Callable[[int, int], None] | None = None) -> bool:
-        """One decision period of the worlds that are ``active``, shape (world,), default all; whether any has diverged.
+        """Advance the ``active`` worlds, shape (world,), default all, by one decision; return whether any has diverged.
 
-        ``action``, shape (world, vehicle, 2), is finite but for the lost. A world that has diverged stays as it is.
-        ``then`` is called with the first and the end of each range of worlds that has been stepped.
+        ``action``, shape (world, vehicle, 2), is finite except for lost vehicles. ``on_stepped`` is called with start
+        and end of each range of worlds that was stepped. A world that has diverged stays unchanged.
         """
         running = self._every if active is None else np.ascontiguousarray(active)
 

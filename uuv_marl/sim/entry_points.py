@@ -1,6 +1,6 @@
-"""What Python calls of the compiled simulation.
+"""Entry points of the compiled simulation from Python.
 
-Numba compiles ``uuv_marl.sim.world`` once without a sea and once with one, so that calm worlds hold nothing of it.
+Numba compiles ``uuv_marl.sim.world`` once with disturbances and once without.
 """
 
 from uuv_marl.sim.arrays import World
@@ -14,18 +14,18 @@ from uuv_marl.types import Bool, Float32
 
 @compiled
 def observe(w: int, world: World, model: Model, buffers: WorkspaceBuffers, disturbances: Disturbances | None) -> None:
-    """Facts and percepts of a world that has just been reset. The first thread's room is used."""
+    """Compute facts and percepts of a world after a reset, in the first thread's workspace."""
     observe_world(w, world, model, workspace(buffers, 0), disturbances)
 
 
 @compiled
 def step_worlds(
-    thread: int, begin: int, end: int, active: Bool, action: Float32, world: World, model: Model, buffers: WorkspaceBuffers,
-    disturbances: Disturbances | None,
+    thread: int, begin: int, end: int, active: Bool, action: Float32, world: World, model: Model,
+    buffers: WorkspaceBuffers, disturbances: Disturbances | None,
 ) -> bool:  # fmt: skip
-    """One decision period of those worlds in a range that are active; whether any of them has diverged.
+    """Advance the active worlds from ``begin`` to ``end`` by one decision period; return whether any has diverged.
 
-    ``begin`` and ``end`` bound the range, ``thread`` is the index of the room to work in.
+    ``active`` has shape (world,), ``action`` (world, vehicle, 2); ``thread`` is the index of the workspace.
     """
     own, diverged = workspace(buffers, thread), False
     for w in range(begin, end):

@@ -1,4 +1,4 @@
-"""The exponential function with the same bits on every machine, which a C library's does not promise."""
+"""The exponential function with the same bits on every machine, unlike a C library's."""
 
 import math
 
@@ -13,10 +13,7 @@ _P4, _P5 = -1.65339022054652515390e-06, 4.13813679705723846039e-08
 
 @compiled_inline
 def exp(x: float) -> float:
-    """The number e to the power of x, within 1 ulp where it is a normal number: the method of Sun's fdlibm (e_exp.c).
-
-    Below -700 it is 0, above 700 it stays what it is at 700.
-    """
+    """e^x within 1 ulp, by the method of Sun's fdlibm (e_exp.c); 0 below x = -700, constant above x = 700."""
     bounded = min(max(x, -700.0), 700.0)
     power = math.floor(bounded * _ONE_OVER_LN2 + 0.5)
     high, low = bounded - power * _LN2_HIGH, power * _LN2_LOW
@@ -31,5 +28,5 @@ def exp(x: float) -> float:
 def decay_mean(x: float) -> float:
     """(1 - e^-x) / x for x >= 0: the mean of e^-t over t from 0 to x; 1 at 0."""
     series = 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))  # the next term is below 1e-17
-    small = x < 1e-3  # where the difference would cancel
+    small = x < 1e-3  # where the difference would lose digits
     return series if small else (1.0 - exp(-x)) / (1.0 if small else x)

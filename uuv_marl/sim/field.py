@@ -1,4 +1,4 @@
-"""Trajectories and obstacles of a world: the scenario's own, or a random field drawn by the world's generator."""
+"""Trajectory and obstacles of a world: the scenario's own, or a random field sampled by the world's generator."""
 
 import math
 from typing import NamedTuple
@@ -21,7 +21,7 @@ class Field(NamedTuple):
 
 
 def sample_field(scenario: Scenario, rng: np.random.Generator) -> Field:
-    """The world's trajectory and obstacles."""
+    """Sample trajectory and obstacles of a world."""
     if scenario.random_field is None:
         obstacles = [(*obstacle.centre_m, obstacle.radius_m) for obstacle in scenario.obstacles]
         return Field(np.array(scenario.trajectory.waypoints_m), np.array(obstacles, np.float64).reshape(-1, 3))
@@ -30,7 +30,7 @@ def sample_field(scenario: Scenario, rng: np.random.Generator) -> Field:
 
 
 def longest_duration(scenario: Scenario) -> float:
-    """Time [s] that l(t) takes at most to the end of a trajectory of this scenario."""
+    """Longest duration of a trajectory of this scenario [s]."""
     speed, field = scenario.trajectory.speed_mps, scenario.random_field
     if field is not None:
         return field.legs[1] * field.leg_length_m[1] / speed
@@ -48,10 +48,9 @@ def _polyline(field: RandomField, rng: np.random.Generator) -> Float64:
 
 
 def _obstacles(scenario: Scenario, field: RandomField, waypoints: Float64, rng: np.random.Generator) -> Float64:
-    """Discs whose gaps are all at least 2 (s_o + s_u).
+    """Sample discs, shape (obstacle, 3) [m], whose gaps are all at least 2 (s_o + s_u).
 
-    Grown by half of that they stay disjoint, so that the free water around them is connected, and some path keeps
-    s_o + s_u from every surface.
+    Grown by half of that they stay disjoint, so that some path keeps s_o + s_u from every surface.
     """
     n, gap = scenario.swarm.num_vehicles, 2 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)
     end_clear = max(field.end_clear_m * growth(n), gap)

@@ -1,4 +1,4 @@
-"""A scenario's numbers, as the compiled functions take them: made once, and never changed."""
+"""Constants of a scenario for the compiled functions."""
 
 import math
 from typing import NamedTuple
@@ -12,43 +12,43 @@ from uuv_marl.sim.vehicle import Plant, plant
 from uuv_marl.types import Float64, Int64
 
 ARRIVAL_RADII_M = (1.0, 5.0, 10.0)
-"""Arrival within these radii is recorded beside the scenario's own (``arrival.radius_m``), while an episode lasts: it
-ends on the scenario's own, so that the time within a smaller radius is often missing."""
+"""Arrival within these radii is recorded, too. The scenario's own (``arrival.radius_m``) ends the episode, often before
+a smaller one is reached."""
 
 _CELL_SPACINGS = 1.25
-"""Side of a cell, in spacings of the start, for swarms that are searched by cells (perf/, docs/speed.md)."""
+"""Side of a cell, in initial spacings (perf/, docs/speed.md)."""
 
 
 class Rules(NamedTuple):
-    """Clocks, thresholds, and the schedule of losses. Lengths in m."""
+    """Time steps, thresholds and the schedule of losses; lengths in m."""
 
     control_step_s: float
     step_s: float
     control_steps: int
-    """Control holds of a decision."""
+    """Control steps of a decision."""
     steps: int
-    """Integration steps of a control hold."""
+    """Integration steps of a control step."""
     hull_radius: float
-    """Radius of a hull."""
+    """Radius of a hull [m]."""
     collision_ends: bool
-    """Whether a vehicle that touches something is lost."""
+    """Whether a vehicle that collides is lost."""
     collision_stops: bool
-    """Whether it stands still there."""
+    """Whether it stops there."""
     passes: bool
-    """Whether the swarm arrives in passage, and l(t) goes on beyond the end (``arrival.criterion``)."""
+    """Whether the swarm arrives by passing the end, and l(t) moves on beyond it (``arrival.criterion``)."""
     dwell_ticks: int
-    """Control holds that the swarm must rest to have arrived; 0 in passage."""
+    """Control steps that the swarm must stay to have arrived; 0 in passage."""
     spread: float
-    """Largest distance of a vehicle from the end for arrival; in passage, from where the centre is along the leg."""
+    """Largest distance of a vehicle from the end at arrival; in passage, from the centre's projection onto the leg."""
     arrival_radii: Float64
-    """Radii for the swarm's centre, the scenario's own first, which is infinite in passage, shape (radius,)."""
+    """Arrival radii of the swarm's centre, the scenario's own first (infinite in passage), shape (radius,)."""
     loss_ticks: Int64
-    """Control hold at whose end each loss happens, shape (loss,)."""
+    """Control step at whose end each loss happens, shape (loss,)."""
     cell_side: float
 
 
 class Model(NamedTuple):
-    """All numbers of a scenario."""
+    """All constants of a scenario."""
 
     plant: Plant
     suite: SonarSuite
@@ -57,12 +57,12 @@ class Model(NamedTuple):
 
 
 def model(scenario: Scenario) -> Model:
-    """The numbers of a scenario. Their types never depend on it, so that nothing is compiled twice."""
+    """Constants of a scenario; their types are the same for all scenarios, so that nothing is compiled twice."""
     return Model(plant(scenario), suite(scenario), rules(scenario), PerceptLayout.of(scenario).offsets)
 
 
 def rules(scenario: Scenario) -> Rules:
-    """Clocks, thresholds and losses of a scenario."""
+    """Time steps, thresholds and losses of a scenario."""
     timing, arrival = scenario.timing, scenario.arrival
     passes, losses_s = arrival.criterion == "passage", np.array(scenario.losses.times_s, np.float64)
     return Rules(

@@ -1,4 +1,4 @@
-"""A world's vehicles moved together: their states as columns, over which loops pass on vector registers."""
+"""Motion of all vehicles of a world: their states as columns, so that loops over them are vectorised."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from uuv_marl.types import Float32
 
 @compiled_inner
 def load_state(w: int, state: State, now: Columns) -> None:
-    """The columns of world w from its state."""
+    """Load the columns of world w from its state."""
     eta, nu = state.eta, state.nu
     for i in range(eta.shape[1]):
         now.x[i], now.y[i], now.psi[i] = eta[w, i, 0], eta[w, i, 1], eta[w, i, 2]
@@ -24,7 +24,7 @@ def load_state(w: int, state: State, now: Columns) -> None:
 
 @compiled_inner
 def load_one(w: int, i: int, state: State, now: Columns) -> None:
-    """The columns of one vehicle alone, whose latest motion is thrown away."""
+    """Load the columns of one vehicle, which discards its latest motion."""
     eta, nu = state.eta, state.nu
     now.x[i], now.y[i], now.psi[i] = eta[w, i, 0], eta[w, i, 1], eta[w, i, 2]
     now.u[i], now.v[i], now.r[i] = nu[w, i, 0], nu[w, i, 1], nu[w, i, 2]
@@ -33,14 +33,14 @@ def load_one(w: int, i: int, state: State, now: Columns) -> None:
 
 @compiled
 def load_action(w: int, action: Float32, now: Columns, plant: Plant) -> None:
-    """The actions of world w, shape (world, vehicle, 2), brought within what the actuators take."""
+    """Load the actions of world w, shape (world, vehicle, 2), projected onto the actuators' range."""
     for i in range(action.shape[1]):
         now.a_x[i], now.a_y[i] = limited(np.float64(action[w, i, 0]), np.float64(action[w, i, 1]), plant)
 
 
 @compiled
 def apply_actuators(first: bool, now: Columns, plant: Plant) -> None:
-    """Forces of one control hold. After the first, they keep their direction in the world; a rudder holds. Eq. 22."""
+    """Set the forces of one control step; after the first they keep their direction in the world. Eq. 22."""
     for i in range(now.x.shape[0]):
         a_x, a_y = now.a_x[i], now.a_y[i]
         if not first:
@@ -51,7 +51,7 @@ def apply_actuators(first: bool, now: Columns, plant: Plant) -> None:
 
 @compiled
 def integrate(steps: int, step_s: float, now: Columns, plant: Plant) -> None:
-    """One control hold. Eq. 1-4, 23-24. Thrust and torque are held; poses and velocities are written."""
+    """Integrate one control step under constant thrust and torque. Eq. 1-4, 23-24. Poses and velocities are written."""
     for _ in range(steps):
         for i in range(now.x.shape[0]):
             state = now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i]

@@ -1,6 +1,6 @@
-"""Which obstacles can matter to a vehicle, so that of hundreds only those are gone through.
+"""Obstacles near a vehicle, so that of hundreds only those are examined; results are as with all of them.
 
-Obstacles are columns, over which loops pass on vector registers. What is passed over changes no result.
+Obstacles are stored as columns, so that loops over them are vectorised.
 """
 
 import math
@@ -14,15 +14,15 @@ Edges = tuple[float, float, float, float]
 """Lower and upper edge of a cone of directions, north and east each; all 0 for all directions."""
 
 ROUND_M = 1e-6
-"""Room for rounding [m]."""
+"""Margin for rounding [m]."""
 _EVERYWHERE = (0.0, 0.0, 0.0, 0.0)
 _SKIN_M = 5.0
-"""How much farther than a vehicle's clearance obstacles are remembered: about as far as it moves in a decision."""
+"""Margin beyond a vehicle's clearance within which obstacles are remembered: about its motion in a decision."""
 
 
 @compiled_inline
 def load_obstacles(w: int, world_map: WorldMap, buffers: ObstacleBuffers) -> None:
-    """The columns of world w's obstacles, all of them chosen; which are nearby is forgotten."""
+    """Load the columns of world w's obstacles, choose all of them, and forget which are nearby."""
     obstacles = obstacle_columns(buffers)
     obstacles.num_nearby[: world_map.group.shape[1]] = -1
     for k in range(world_map.num_obstacles[w]):
@@ -32,7 +32,7 @@ def load_obstacles(w: int, world_map: WorldMap, buffers: ObstacleBuffers) -> Non
 
 @compiled_inline
 def load_places(w: int, world_map: WorldMap, buffers: ObstacleBuffers) -> None:
-    """The columns of where world w's obstacles are, once they may have moved."""
+    """Load the positions of world w's obstacles again, once they may have moved."""
     obstacles = obstacle_columns(buffers)
     for k in range(world_map.num_obstacles[w]):
         obstacles.x[k], obstacles.y[k] = world_map.obstacles[w, k, 0], world_map.obstacles[w, k, 1]
@@ -40,9 +40,9 @@ def load_places(w: int, world_map: WorldMap, buffers: ObstacleBuffers) -> None:
 
 @compiled_inline
 def choose(num: int, x: float, y: float, reach: float, cone: Edges, obstacles: Obstacles) -> int:
-    """Choose those of the obstacles that meet a cone from (x, y) within a reach [m]; how many. A few more, at its rim.
+    """Choose those of the first ``num`` obstacles that meet a cone from (x, y) within a reach [m]; return how many.
 
-    Of the obstacles the first ``num`` count. ``obstacles.chosen`` is written.
+    A few more at the rim may be chosen. ``obstacles.chosen`` is written.
     """
     l_x, l_y, u_x, u_y = cone
     for k in range(num):
@@ -62,7 +62,7 @@ def choose(num: int, x: float, y: float, reach: float, cone: Edges, obstacles: O
 def remember_nearby(w: int, world: World, rules: Rules, buffers: ObstacleBuffers) -> None:
     """Remember which obstacles may come near each vehicle until the next decision.
 
-    How near that is, is guessed from the clearance of the step before. The room is written.
+    The distance is estimated from the clearance of the previous step. ``buffers`` is written.
     """
     obstacles = obstacle_columns(buffers)
     eta, num, fastest = world.state.eta, world.world_map.num_obstacles[w], 0.0
@@ -83,9 +83,9 @@ def remember_nearby(w: int, world: World, rules: Rules, buffers: ObstacleBuffers
 
 @compiled_inline
 def nearest_surface(i: int, x: float, y: float, obstacles: Obstacles) -> tuple[float, float]:
-    """Distance of the nearest remembered surface from vehicle i, at (x, y), and what all others are beyond [m].
+    """Distance of the nearest remembered surface from vehicle i, at (x, y), and a lower bound for all others [m].
 
-    Where none are remembered, the others may be anywhere.
+    Where none are remembered, the bound is minus infinity.
     """
     if obstacles.num_nearby[i] < 0:
         return math.inf, -math.inf

@@ -1,4 +1,4 @@
-"""The observation: every vehicle's percept, scaled by the table in ``uuv_marl.percept``, or as closeness."""
+"""Observations: percepts scaled by the table in ``uuv_marl.percept``, or as closeness."""
 
 from collections.abc import Callable
 from typing import Literal
@@ -7,12 +7,11 @@ import numpy as np
 
 from uuv_marl.percept import (
     DIRECTION,
-    SPEED,
-    YAW_RATE,
-    Kind,
+    FieldTable,
     Percept,
     PerceptField,
     PerceptLayout,
+    Quantity,
     Starts,
     percept_table,
 )
@@ -23,20 +22,20 @@ from uuv_marl.types import Float32
 
 Observe = Literal["positions", "closeness"]
 
-CLOSENESS = Kind("1", 1.0, 0.0, 2.0)
-_SIGNED = Kind("1", 1.0, -2.0, 2.0)
-_NEAR = Kind("1", 1.0, 0.0, 4.0)
+CLOSENESS = Quantity("1", 1.0, 0.0, 2.0)
+_SIGNED = Quantity("1", 1.0, -2.0, 2.0)
+_NEAR = Quantity("1", 1.0, 0.0, 4.0)
 _BASE = len(percept_table(0, 0, ()))
-"""Rows that every percept has; ``closeness`` stands for these."""
+"""Number of fields of every percept, which ``closeness`` replaces."""
 _BEFORE = 9
-"""Entries of ``closeness`` before those of sub-sectors: velocities, reference."""
+"""Entries of ``closeness`` before those of sub-sectors: velocities and reference."""
 
 
 def observation_layout(scenario: Scenario, observe: Observe) -> PerceptLayout:
     """The table of an observation, with its bounds and scales.
 
     Raises:
-        ValueError: there is no such observation.
+        ValueError: ``observe`` has another value.
     """
     percept = PerceptLayout.of(scenario)
     if observe == "positions":
@@ -46,16 +45,17 @@ def observation_layout(scenario: Scenario, observe: Observe) -> PerceptLayout:
     return PerceptLayout((*closeness_table(scenario), *percept.table[_BASE:]))
 
 
-def closeness_table(scenario: Scenario) -> tuple[PerceptField, ...]:
-    """The fields of ``closeness`` that stand for those of every percept; p: a position [m], d: its length."""
+def closeness_table(scenario: Scenario) -> FieldTable:
+    """The fields of ``closeness`` that replace those of every percept; p: a position [m], d: its length."""
     sectors, active = scenario.sonar.num_sectors, scenario.sonar.num_active_sectors
+    own = {row.name: row for row in percept_table(sectors, active, ())}
     return (
-        PerceptField("velocity", (2,), SPEED, "own surge and sway velocity"),
-        PerceptField("yaw_rate", (1,), YAW_RATE, "own yaw rate"),
+        own["velocity"],
+        own["yaw_rate"],
         PerceptField("reference_direction", (2,), DIRECTION, "p/(d + 1 m), p: vector to the reference point"),
         PerceptField("reference_near", (2,), _NEAR, "min(d/64 m, 4) and min(d/16 m, 4)"),
-        PerceptField("reference_velocity", (2,), SPEED, "velocity of the reference point"),
-        PerceptField("closeness", (sectors,), CLOSENESS, "per sub-sector: c = 8 m/(d + 4 m) of whom it hears, or 0"),
+        own["reference_velocity"],
+        PerceptField("closeness", (sectors,), CLOSENESS, "per sub-sector: c = 8 m/(d + 4 m) of its vehicle, or 0"),
         PerceptField("neighbour_direction", (sectors, 2), _SIGNED, "per sub-sector: c p/d of that vehicle"),
         PerceptField("echo_closeness", (active,), CLOSENESS, "per active sub-sector: e = 20 m/(range + 10 m), or 0"),
         PerceptField("echo_direction", (active, 2), _SIGNED, "per active sub-sector: e p/d of the echo's position"),
@@ -63,9 +63,9 @@ def closeness_table(scenario: Scenario) -> tuple[PerceptField, ...]:
 
 
 def observer(percept: Percept, layout: PerceptLayout) -> tuple[Float32, Callable[[int, int], None]]:
-    """A new array (world, vehicle, entry), and what fills it, from the first to the end of a range of worlds.
+    """A new array (world, vehicle, entry), and a function that fills a range of worlds with present observations.
 
-    It holds ``Percept.to_observation``, or the same as closeness, of what ``percept.flat`` holds at that time.
+    They are those of ``Percept.to_observation``, or closeness, of ``percept.flat``.
     """
     flat, own = percept.flat, percept.layout
     observation = np.empty((*flat.shape[:2], layout.size), np.float32)
@@ -78,7 +78,7 @@ def observer(percept: Percept, layout: PerceptLayout) -> tuple[Float32, Callable
 
 @compiled
 def _scale(begin: int, end: int, flat: Float32, inverse: Float32, observation: Float32) -> None:
-    """Scales are powers of two: a product with the inverse has the quotient's bits."""
+    """Fill observations; scales are powers of two, so that a product with the inverse has the quotient's bits."""
     for w in range(begin, end):
         for i in range(flat.shape[1]):
             for k in range(flat.shape[2]):
@@ -87,7 +87,7 @@ def _scale(begin: int, end: int, flat: Float32, inverse: Float32, observation: F
 
 @compiled
 def _weigh(begin: int, end: int, flat: Float32, at: Starts, rest: int, inverse: Float32, observation: Float32) -> None:
-    """Fill ``closeness``; what stands in the percept from entry ``rest`` on is scaled as everywhere."""
+    """Fill ``closeness``; the percept's entries from ``rest`` on are scaled as usual."""
     see = fields(flat, at)
     sectors, active = see.detected.shape[2], see.echo.shape[2]
     for w in range(begin, end):

@@ -1,8 +1,8 @@
-"""What a vehicle perceives: echoes of obstacles (Eq. 11, 16-17), and the percept made of all that it knows."""
+"""Percepts: echoes of obstacles (Eq. 11, 16-17), detections and navigation in the body frame of each vehicle."""
 
 import math
 
-from uuv_marl.percept import MAX_SPEED
+from uuv_marl.percept import MAX_SPEED, Fields
 from uuv_marl.scenario import MAX_RANGE_M
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
@@ -10,7 +10,6 @@ from uuv_marl.sim.detection import Pose
 from uuv_marl.sim.model import Model
 from uuv_marl.sim.nearby import choose
 from uuv_marl.sim.sonar import SonarSuite, cross
-from uuv_marl.sim.views import Fields
 from uuv_marl.sim.workspace import MOST_NEARBY, ObstacleBuffers, Workspace, obstacle_columns
 
 
@@ -18,12 +17,13 @@ from uuv_marl.sim.workspace import MOST_NEARBY, ObstacleBuffers, Workspace, obst
 def echo(
     c_x: float, c_y: float, radius: float, l_x: float, l_y: float, u_x: float, u_y: float
 ) -> tuple[float, float, float]:
-    """Range [m] and nearest point, in the body frame [m], of a disc's surface within a beam; range infinite for none.
+    """Range [m] and nearest point, in the body frame [m], of a disc's surface within a beam. Eq. 16-17.
 
-    Inside the disc the range is 0. The beam lies between l and u, unit vectors; c is the disc's centre.
+    The range is infinite for none, and 0 inside the disc. The beam lies between unit vectors l and u; c is the disc's
+    centre.
     """
     ahead = cross(l_x, l_y, c_x, c_y) > 0.0 and cross(u_x, u_y, c_x, c_y) <= 0.0
-    if ahead or c_x * c_x + c_y * c_y <= 1.001 * radius * radius:  # else a hypotenuse would be the longest part
+    if ahead or c_x * c_x + c_y * c_y <= 1.001 * radius * radius:  # saves most calls of hypot
         distance = math.hypot(c_x, c_y)
         if distance <= radius:
             return 0.0, 0.0, 0.0
@@ -49,17 +49,14 @@ def saturate(value: float, limit: float) -> float:
 
 @compiled_inline
 def toward(dx: float, dy: float, c: float, s: float) -> tuple[float, float]:
-    """A vector in the body frame, ahead and to starboard [m]; one longer than ``MAX_RANGE_M`` is cut to that."""
+    """A vector (north, east) in the body frame, ahead and to starboard [m]; at most ``MAX_RANGE_M`` long."""
     far = max(math.sqrt(dx * dx + dy * dy) / MAX_RANGE_M, 1.0)
     return saturate((c * dx + s * dy) / far, MAX_RANGE_M), saturate((c * dy - s * dx) / far, MAX_RANGE_M)
 
 
 @compiled_inline
 def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspace, see: Fields) -> None:
-    """What one vehicle knows, into the fields of its percept. Eq. 11, 14-17.
-
-    The vehicle's percept is cleared and written.
-    """
+    """Write the percept of entry p's vehicle. Eq. 11, 14-17."""
     cells, listener, world_map = workspace.cells, workspace.listener, world.world_map
     nu, reference, i = world.state.nu, world.facts.reference, cells.vehicle[p]
     x, y, c, s = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
@@ -103,9 +100,9 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
 def write_echoes(
     i: int, w: int, num: int, pose: Pose, buffers: ObstacleBuffers, suite: SonarSuite, see: Fields
 ) -> None:
-    """What one vehicle hears of obstacles: per active sub-sector the nearest surface. Eq. 11, 16-17.
+    """Write the echo of the nearest of ``num`` chosen obstacles in each active sub-sector. Eq. 11, 16-17.
 
-    Of the obstacles the first ``num`` chosen count. What was written stays where nothing is heard.
+    Fields without an echo stay as they are.
     """
     (x, y, c, s), obstacles = pose, obstacle_columns(buffers)
     for t in range(num):

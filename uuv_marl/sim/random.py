@@ -1,9 +1,8 @@
-"""Random numbers as a function of where they are used: episode key, purpose, time, vehicle, slot. Nothing is stored.
+"""Counter-based random numbers: a function of episode key, purpose, time, vehicle and slot, without a state.
 
-A disturbance that draws here moves no other draw, and gives the same numbers whatever the batch, the threads or the
-API. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC11): the key is its
-key, the four others are its counter. The logarithm is our own, since a C library's may differ in the last bit between
-machines. Loops that do nothing but draw run on vector registers.
+So a disturbance never changes another's numbers, and batch size, threads and API don't matter. The generator is
+Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC11): the episode's key is its key, the
+four others are its counter. The logarithm is implemented here, since a C library's may differ in the last bit.
 """
 
 import hashlib
@@ -27,22 +26,18 @@ _FRACTION, _ONE_HALF = np.int64((1 << 52) - 1), np.int64(1022 << 52)
 """Bits of a number's fraction, and those of 0.5."""
 _LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 _L1, _L2, _L3 = 6.666666666666735130e-01, 3.999999999940941908e-01, 2.857142874366239149e-01
-_L4, _L5, _L6, _L7 = (
-    2.222219843214978396e-01,
-    1.818357216161805012e-01,
-    1.531383769920937332e-01,
-    1.479819860511658591e-01,
-)
+_L4, _L5 = 2.222219843214978396e-01, 1.818357216161805012e-01
+_L6, _L7 = 1.531383769920937332e-01, 1.479819860511658591e-01
 
 
 def episode_key(stream: np.random.Generator) -> np.uint64:
-    """The key of the episode that a reset draws from this stream: a hash of its state before the draws."""
+    """Key of the episode that a reset samples from this generator: a hash of its state before."""
     return np.uint64(int.from_bytes(hashlib.blake2b(packed([stream]).tobytes(), digest_size=8).digest(), "little"))
 
 
 @compiled_inline
 def philox(key: np.uint64, c_0: np.uint64, c_1: np.uint64, c_2: np.uint64, c_3: np.uint64) -> Block:
-    """Four random words of 32 bits. The words of the counter are below 2^32."""
+    """Four random words of 32 bits from a key and a counter of four such words."""
     k_0, k_1 = key & _LOW, key >> _HALF
     for _ in range(10):
         p_0, p_1 = _MULTIPLIER_0 * c_0, _MULTIPLIER_1 * c_2
@@ -56,11 +51,11 @@ def uniforms(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -
     """Two independent numbers, uniform in [0, 1), multiples of 2^-53.
 
     Args:
-        key: of the episode (``Swarm.keys``).
-        purpose: what they are for, one number for each disturbance.
-        time: control hold, ping or decision at which they are used, below 2^32.
-        vehicle: whose they are.
-        slot: which of the vehicle's pairs at this time.
+        key: key of the episode (``Swarm.keys``).
+        purpose: constant of ``uuv_marl.sim.disturbances.purposes``.
+        time: control step, reading or decision, below 2^32.
+        vehicle: index of the vehicle.
+        slot: index among the vehicle's pairs at this time.
     """
     w_0, w_1, w_2, w_3 = philox(
         key, np.uint64(purpose) & _LOW, np.uint64(time) & _LOW, np.uint64(vehicle) & _LOW, np.uint64(slot) & _LOW
@@ -72,13 +67,13 @@ def uniforms(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -
 
 @compiled_inline
 def uniform(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> float:
-    """A number uniform in [0, 1), from the same as ``uniforms``."""
+    """A number uniform in [0, 1), the first of ``uniforms``."""
     return uniforms(key, purpose, time, vehicle, slot)[0]
 
 
 @compiled_inline
 def normals(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> tuple[float, float]:
-    """Two independent standard normal numbers (Box and Muller 1958); arguments as for ``uniform``."""
+    """Two independent standard normal numbers (Box and Muller 1958); arguments as for ``uniforms``."""
     first, second = uniforms(key, purpose, time, vehicle, slot)
     radius = math.sqrt(-2.0 * log(1.0 - first))
     c, s = cos_sin(2.0 * math.pi * second)
@@ -87,7 +82,7 @@ def normals(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) ->
 
 @compiled_inline
 def normal(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -> float:
-    """A standard normal number; arguments as for ``uniform``."""
+    """A standard normal number; arguments as for ``uniforms``."""
     return normals(key, purpose, time, vehicle, slot)[0]
 
 

@@ -1,10 +1,10 @@
 """The sonar suite (Eq. 8-12): arrays of sub-sectors, and the table that finds a direction's sub-sector.
 
-Echoes are made in ``perception.py``; whom a vehicle hears is found in ``hearing.py``.
+``perception.py`` computes echoes, ``detection.py`` detections of vehicles.
 
-A direction is given by its vector in the body frame, x forward and y starboard. A sub-sector holds the directions
-clockwise of its lower edge up to and including its upper edge, so that an edge belongs to the lower index, and arrays
-that tile the circle hear every direction once. Membership is decided by signs of cross products alone.
+A direction is a vector in the body frame, x forward and y starboard. A sub-sector contains the directions clockwise of
+its lower edge up to and including its upper edge, so that arrays that tile the circle cover every direction once. Signs
+of cross products decide membership.
 """
 
 import itertools
@@ -18,23 +18,23 @@ from uuv_marl.sim.compiled import compiled_inline
 from uuv_marl.types import Float64, Int64
 
 _TINY = 1e-300
-"""Keeps the direction of no vector at all from dividing by zero."""
+"""Avoids division by zero for a null vector."""
 _MIN_BINS = 1024
-"""Least number of bins: so many that few directions fall into a bin with an edge."""
+"""Least number of bins, so that few directions fall into a bin with an edge."""
 
 
 class SonarSuite(NamedTuple):
-    """The arrays as sub-sectors, whose edges are unit vectors, and the table that finds a direction's sub-sector."""
+    """The arrays' sub-sectors, whose edges are unit vectors, and the table that finds a direction's sub-sector."""
 
     lower: Float64
     """Lower edge of each sub-sector, shape (sector, 2)."""
     upper: Float64
     """Upper edge of each sub-sector, shape (sector, 2)."""
     squared_range: Float64
-    """Squared range of each sub-sector [m2], and -1 for what no array hears, shape (sector + 1,)."""
+    """Squared range of each sub-sector [m2], and -1 for directions outside all, shape (sector + 1,)."""
     codes: Int64
-    """Per layer and bin of direction: a sub-sector, or where the bin holds an edge, sector + 1 + that edge's index.
-    Shape (layer, bin); the number of bins is a power of two."""
+    """Sub-sector of each bin of direction, or sector + 1 + index of the edge in it, shape (layer, bin).
+    The number of bins is a power of two."""
     edges: Float64
     """Edges between sub-sectors of a layer, shape (edge, 2)."""
     sides: Int64
@@ -46,15 +46,15 @@ class SonarSuite(NamedTuple):
     reach: float
     """The longest of them [m], 0 for none."""
     cone: tuple[float, float, float, float]
-    """Lower and upper edge, unit vectors, of a cone around all active sub-sectors; zeros where none is so narrow."""
+    """Lower and upper edge, unit vectors, of a cone around all active sub-sectors; zeros if not below 180 deg."""
     reports_surface: bool
-    """Whether an echo's position is the surface point heard, not the obstacle's centre."""
+    """Whether an echo's position is the detected surface point, not the obstacle's centre."""
     obstacles_hide: bool
-    """Whether an obstacle on the line of sight silences a vehicle."""
+    """Whether an obstacle on the line of sight hides a vehicle."""
 
 
 def suite(scenario: Scenario) -> SonarSuite:
-    """The scenario's sonar suite as numbers for the compiled functions. Eq. 12."""
+    """Constants of the scenario's sonar suite for the compiled functions. Eq. 12."""
     lower: list[tuple[float, float]] = []
     upper: list[tuple[float, float]] = []
     ranges: list[float] = []
@@ -87,7 +87,7 @@ def suite(scenario: Scenario) -> SonarSuite:
 
 
 def _cone(beams: list[tuple[tuple[float, float], tuple[float, float]]]) -> tuple[float, float, float, float]:
-    """``SonarSuite.cone``: narrower than half a turn, between the edges of beams that are."""
+    """``SonarSuite.cone``, below 180 degrees, for beams given by lower and upper edge."""
     for lower, _ in beams:
         for _, upper in beams:
             edges = [lower, *itertools.chain(*beams), upper]
@@ -98,20 +98,20 @@ def _cone(beams: list[tuple[tuple[float, float], tuple[float, float]]]) -> tuple
 
 
 def _unit(degrees: float) -> tuple[float, float]:
-    """Unit vector of a direction; equal directions give equal bits, whatever turn they were counted in."""
+    """Unit vector of a direction [deg]; directions equal modulo 360 give equal bits."""
     radians = math.radians((degrees + 180.0) % 360.0 - 180.0)
     return math.cos(radians), math.sin(radians)
 
 
 @compiled_inline
 def cross(a_x: float, a_y: float, b_x: float, b_y: float) -> float:
-    """Positive where b is clockwise of a, by less than half a turn."""
+    """Cross product of a and b: positive where b is clockwise of a by less than 180 degrees."""
     return a_x * b_y - a_y * b_x
 
 
 @compiled_inline
 def diamond(b_x: float, b_y: float) -> float:
-    """Direction of b on a scale from 0 (astern) clockwise over port, 2 (ahead), starboard to 4; 2 for no direction."""
+    """Direction of b as a number: from 0 astern clockwise, 1 port, 2 ahead, 3 starboard, to 4; 2 for a null vector."""
     share = b_y / (abs(b_x) + abs(b_y) + _TINY)
     behind = 4.0 - share if b_y >= 0.0 else -share
     return 2.0 + share if b_x >= 0.0 else behind
@@ -120,8 +120,8 @@ def diamond(b_x: float, b_y: float) -> float:
 def _table(lower: list[tuple[float, float]], upper: list[tuple[float, float]]) -> tuple[Int64, Float64, Int64]:
     """``SonarSuite``'s codes, edges and sides.
 
-    A layer holds sub-sectors that do not overlap, arrays that do fall into several. A bin is so narrow that it holds
-    one edge of its layer at most, with room for rounding.
+    Sub-sectors of a layer don't overlap. A bin is so narrow that it contains at most one edge of its layer, with a
+    margin for rounding.
     """
     start = [diamond(*edge) for edge in lower]
     span = [(diamond(*b) - diamond(*a)) % 4.0 for a, b in zip(lower, upper, strict=True)]
@@ -129,7 +129,7 @@ def _table(lower: list[tuple[float, float]], upper: list[tuple[float, float]]) -
     apart = 12.0 / bins
 
     def follows(b: int, a: int) -> bool:
-        """Whether sub-sector b starts at or clear beyond the end of a."""
+        """Whether sub-sector b starts at the end of a or beyond the margin after it."""
         return upper[a] == lower[b] or (start[b] - start[a]) % 4.0 >= span[a] + apart
 
     layers: list[list[int]] = []

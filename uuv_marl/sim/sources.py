@@ -1,7 +1,7 @@
-"""What a compiled function is made of: the code of its module and of all that this module imports.
+"""Hashes of the code that a compiled function depends on: its module and all that this module imports.
 
-Numba notices an edit of a function's own file, but not one of a function that it calls, or of a constant in another
-file. So its cache is keyed by the modules that the function can reach. Comments and docstrings don't count.
+Numba notices an edit of a function's own file, but not of functions or constants in other files. So its cache is keyed
+by all modules that the function can reach, without comments and docstrings.
 """
 
 import ast
@@ -15,9 +15,9 @@ from typing import Any, cast
 
 @functools.cache
 def source_key(module: str, settings: str = "") -> str | None:
-    """Hash of the code that a module's functions are compiled from, and of ``settings``; None where code is missing.
+    """Hash of the code that a module's functions are compiled from, and of ``settings``; None without sources.
 
-    A package without sources (byte code alone, or a frozen program) has no key, since a change would not be seen.
+    A package without sources (byte code only, or frozen) has no key, since changes would go unnoticed.
     """
     hashes = {name: _hash(name) for name in reached_modules(module)}
     if None in hashes.values():
@@ -40,7 +40,7 @@ def reached_modules(module: str) -> frozenset[str]:
 
 @functools.cache
 def _tree(module: str) -> ast.Module | None:
-    """A module's source, also of one in a zip file, without its docstrings; None where only byte code is there."""
+    """Syntax tree of a module, also in a zip file, without docstrings; None if there is only byte code."""
     loader: Any = getattr(sys.modules.get(module), "__loader__", None)
     if loader is None:
         spec = importlib.util.find_spec(module)
@@ -64,7 +64,7 @@ def _hash(module: str) -> str | None:
 
 
 def _named(module: str) -> Iterator[str]:
-    """Whatever a module's import statements name, wherever they stand: modules, and things in modules."""
+    """All modules and names in modules that a module's import statements name."""
     tree = _tree(module)
     own = sys.modules.get(module)
     for node in ast.walk(tree) if tree else ():

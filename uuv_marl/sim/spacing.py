@@ -1,21 +1,21 @@
-"""Distances between vehicles and to obstacles, and the contacts that begin: what is measured, whoever hears it."""
+"""Distances between vehicles and to obstacles, and collisions: true values, independent of the sonar."""
 
 import math
 
 from uuv_marl.sim.arrays import World
-from uuv_marl.sim.cells import Grid, place
+from uuv_marl.sim.cells import Grid, covered
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.nearby import nearest_surface
 from uuv_marl.sim.workspace import Cells, ObstacleBuffers, Obstacles, obstacle_columns
 from uuv_marl.types import Float64
 
 NOWHERE = (math.inf, math.inf, 0.0)
-"""Where an obstacle was that there was not."""
+"""Previous centre and radius of an obstacle that did not exist."""
 
 
 @compiled_inner
 def find_nearest(cells: Cells, grid: Grid) -> None:
-    """Fill ``cells.nearest``, infinite where there is nobody else."""
+    """Fill ``cells.nearest`` [m2], infinite for a single vehicle."""
     cells.nearest[: grid.living] = math.inf
     if grid.rows * grid.columns == 1:
         for p in range(grid.living):
@@ -28,10 +28,7 @@ def find_nearest(cells: Cells, grid: Grid) -> None:
 
 @compiled_inline
 def lower_all(first: int, end: int, x: float, y: float, cells: Cells) -> None:
-    """Let entries of the cells know of somebody.
-
-    Those from ``first`` on, before ``end``; ``cells.nearest`` is lowered.
-    """
+    """Lower ``cells.nearest`` of entries ``first`` to ``end`` by their squared distance from (x, y)."""
     for q in range(first, end):
         dx, dy = cells.x[q] - x, cells.y[q] - y
         squared = dx * dx + dy * dy
@@ -40,23 +37,16 @@ def lower_all(first: int, end: int, x: float, y: float, cells: Cells) -> None:
 
 @compiled_inner
 def nearest_squared(p: int, cells: Cells, grid: Grid) -> float:
-    """Squared distance [m2] of entry p from the nearest other: in the cells around it, then in ever larger blocks."""
+    """Squared distance [m2] of entry p from the nearest other: in the cells around it, then in larger blocks."""
     x, y, least, reach = cells.x[p], cells.y[p], math.inf, grid.side
     while True:
-        top, bottom = (
-            place(x - reach, grid.x_min, grid.side, grid.rows),
-            place(x + reach, grid.x_min, grid.side, grid.rows),
-        )
-        left, right = (
-            place(y - reach, grid.y_min, grid.side, grid.columns),
-            place(y + reach, grid.y_min, grid.side, grid.columns),
-        )
-        for r in range(top, bottom + 1):
+        bottom, top, left, right = covered((x + reach, x - reach, y + reach, y - reach), grid)
+        for r in range(bottom, top + 1):
             for q in range(cells.first[r * grid.columns + left], cells.first[r * grid.columns + right + 1]):
                 dx, dy = cells.x[q] - x, cells.y[q] - y
                 squared = dx * dx + dy * dy
                 least = squared if squared < least and q != p else least
-        covers_all = top == 0 and left == 0 and bottom == grid.rows - 1 and right == grid.columns - 1
+        covers_all = bottom == 0 and left == 0 and top == grid.rows - 1 and right == grid.columns - 1
         if least <= reach * reach or covers_all:
             return least
         reach *= 2.0
@@ -64,21 +54,12 @@ def nearest_squared(p: int, cells: Cells, grid: Grid) -> float:
 
 @compiled_inner
 def new_collisions(w: int, p: int, touch: float, before: Float64, cells: Cells, grid: Grid) -> int:
-    """Contact episodes of one vehicle that begin: others that are near now and were not one control hold ago.
-
-    ``touch``: distance of two centres below which they are in contact [m].
-    """
+    """Number of vehicles nearer to one than ``touch`` [m], between centres, that were not one control step ago."""
     i, count = cells.vehicle[p], 0
     rings = 0.0 if grid.rows * grid.columns == 1 else touch
-    top, bottom = (
-        place(cells.x[p] - rings, grid.x_min, grid.side, grid.rows),
-        place(cells.x[p] + rings, grid.x_min, grid.side, grid.rows),
-    )
-    left, right = (
-        place(cells.y[p] - rings, grid.y_min, grid.side, grid.columns),
-        place(cells.y[p] + rings, grid.y_min, grid.side, grid.columns),
-    )
-    for r in range(top, bottom + 1):
+    box = cells.x[p] + rings, cells.x[p] - rings, cells.y[p] + rings, cells.y[p] - rings
+    bottom, top, left, right = covered(box, grid)
+    for r in range(bottom, top + 1):
         for q in range(cells.first[r * grid.columns + left], cells.first[r * grid.columns + right + 1]):
             dx, dy = cells.x[q] - cells.x[p], cells.y[q] - cells.y[p]
             if q == p or dx * dx + dy * dy >= touch * touch:
@@ -91,9 +72,9 @@ def new_collisions(w: int, p: int, touch: float, before: Float64, cells: Cells, 
 
 @compiled_inner
 def measure_vehicles(w: int, hull_radius: float, world: World, cells: Cells, grid: Grid) -> int:
-    """Lower the spacing of the living and raise their contacts; how many episodes between vehicles began.
+    """Update spacings and collisions of the living; return the number of new collisions between vehicles.
 
-    A contact episode begins where two hulls overlap now and did not one control hold ago.
+    A collision begins where two hulls overlap that did not one control step ago.
     """
     before, facts = world.state.before, world.facts
     touch, began = 2.0 * hull_radius, 0
@@ -113,9 +94,9 @@ def measure_vehicles(w: int, hull_radius: float, world: World, cells: Cells, gri
 def measure_obstacles(
     w: int, hull_radius: float, world: World, buffers: ObstacleBuffers, cells: Cells, grid: Grid
 ) -> int:
-    """Lower the clearances, of vehicles and of obstacles, and raise the contacts; how many episodes began.
+    """Update clearances of vehicles and obstacles, and collisions; return the number of new collisions with obstacles.
 
-    A contact episode begins where a hull meets an obstacle now and did not one control hold ago; either may have moved.
+    A collision begins where a hull overlaps an obstacle and did not one control step ago; either may have moved.
     ``state.obstacles_before`` is written, too.
     """
     num, facts, obstacles_before = world.world_map.num_obstacles[w], world.facts, world.state.obstacles_before
@@ -141,7 +122,7 @@ def measure_obstacles(
 
 @compiled_inline
 def lower_squares(num: int, x: float, y: float, obstacles: Obstacles) -> None:
-    """Let the first ``num`` obstacles know of a vehicle at (x, y); ``obstacles.squared`` is lowered."""
+    """Lower ``obstacles.squared`` of the first ``num`` by their squared distance from a vehicle at (x, y)."""
     for k in range(num):
         dx, dy = obstacles.x[k] - x, obstacles.y[k] - y
         squared = dx * dx + dy * dy
@@ -150,7 +131,7 @@ def lower_squares(num: int, x: float, y: float, obstacles: Obstacles) -> None:
 
 @compiled_inline
 def meet_obstacles(w: int, i: int, x: float, y: float, hull_radius: float, world: World, obstacles: Obstacles) -> int:
-    """Lower vehicle i's clearance, at (x, y), and the obstacles', and raise its contacts; how many episodes began."""
+    """Update clearances and collisions of vehicle i, at (x, y), with all obstacles; return the number of new ones."""
     facts, before, obstacles_before, began = world.facts, world.state.before, world.state.obstacles_before, 0
     for k in range(world.world_map.num_obstacles[w]):
         dx, dy = obstacles.x[k] - x, obstacles.y[k] - y
@@ -169,7 +150,7 @@ def meet_obstacles(w: int, i: int, x: float, y: float, hull_radius: float, world
 
 @compiled_inner
 def farthest(x: float, y: float, cells: Cells, grid: Grid) -> int:
-    """The entry of ``cells`` that is farthest from a point, -1 for none."""
+    """Entry of ``cells`` farthest from a point, -1 for none."""
     best, most = -1, -1.0
     for p in range(grid.living):
         dx, dy = cells.x[p] - x, cells.y[p] - y
@@ -183,7 +164,7 @@ def farthest(x: float, y: float, cells: Cells, grid: Grid) -> int:
 def extent(cells: Cells, grid: Grid) -> float:
     """Largest distance between two of the living [m], infinite for fewer than two.
 
-    A pair is at most as far apart as the two are, together, from the middle; few vehicles can beat a good first guess.
+    A pair's distance is at most the sum of the two from the centre, so that few vehicles can exceed a good first guess.
     """
     n = grid.living
     if n < 2:

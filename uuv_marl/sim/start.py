@@ -1,4 +1,4 @@
-"""Initial states: two groups behind the trajectory's first point, at a guaranteed spacing."""
+"""Initial states: two groups behind the trajectory's first point, with a guaranteed spacing."""
 
 import math
 
@@ -12,9 +12,9 @@ _TRIES_PER_VEHICLE = 64
 
 
 def start_state(scenario: Scenario, waypoints: Float64, rng: np.random.Generator) -> tuple[Float64, Float64]:
-    """Pose eta (vehicle, 3) and velocity nu (vehicle, 3), drawn from the scenario's start. Section 5.1.
+    """Sample poses eta and velocities nu, shape (vehicle, 3) each, from the scenario's start. Section 5.1.
 
-    The first half of the vehicles, and the odd one, form the port group.
+    The first half of the vehicles, rounded up, forms the port group.
     """
     n, start = scenario.swarm.num_vehicles, scenario.start
     length, width = start.sides(n)
@@ -33,7 +33,7 @@ def start_state(scenario: Scenario, waypoints: Float64, rng: np.random.Generator
 
 
 def _group(scenario: Scenario, count: int, rng: np.random.Generator) -> Float64:
-    """Places (vehicle, 2) in one rectangle [0, length] x [0, width]: random, or on a lattice where random jams."""
+    """Positions (vehicle, 2) in a rectangle [0, length] x [0, width] [m]: random, or on a lattice if too dense."""
     n, start = scenario.swarm.num_vehicles, scenario.start
     length, width = start.sides(n)
     candidates, placed = np.zeros((count * _TRIES_PER_VEHICLE, 3)), np.empty((count, 3))
@@ -43,15 +43,15 @@ def _group(scenario: Scenario, count: int, rng: np.random.Generator) -> Float64:
     columns, rows, row_m = start.lattice(n)
     row, column = np.divmod(rng.permutation(columns * rows)[:count], columns)
     lattice = np.stack([row * row_m, (column + 0.5 * (row % 2)) * start.spacing_m], axis=1)
-    # A hair's breadth wider, so that rounding never brings two vehicles below the spacing.
+    # Slightly wider, so that rounding never brings two vehicles below the spacing.
     return lattice * (1.0 + 1e-12)
 
 
 @compiled
 def scatter(candidates: Float64, gap: float, placed: Float64) -> int:
-    """Fill ``placed`` with the discs that keep a gap [m] from all before them; how many were found.
+    """Fill ``placed`` with the discs that keep a gap [m] from all before them; return how many.
 
-    Both have shape (disc, 3): two coordinates and a radius [m], 0 for a point.
+    Both arrays have shape (disc, 3): two coordinates and a radius [m], 0 for a point.
     """
     num_placed = 0
     for k in range(candidates.shape[0]):

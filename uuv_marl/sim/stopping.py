@@ -1,7 +1,7 @@
-"""Contacts that hurt (``collision.stops``): a hull that runs into a surface or another hull stands still there.
+"""Collisions that stop (``collision.stops``): a hull that hits a surface or another hull stops there.
 
-An impulse between them, through the hulls' middles and without friction, takes the velocity into it: perfectly
-inelastic, so that energy never rises, and that of two hulls keeps their momentum (added mass included).
+A central impulse without friction removes the velocity into it: perfectly inelastic, so that energy never rises; that
+between two hulls conserves their momentum (added mass included).
 """
 
 import math
@@ -18,33 +18,27 @@ from uuv_marl.sim.vehicle import Plant
 from uuv_marl.sim.workspace import Workspace, obstacle_columns
 
 SINK_M = 0.001
-"""How deep a hull is left in what it touches [m], so that it stays one contact while it presses on. Assumed."""
+"""Overlap left between a hull and what it hits [m], so that pressing on stays one collision. Assumed."""
 
 
 @compiled_inner
 def stop_hulls(
-    w: int, world: World, rules: Rules, plant: Plant, own: Workspace, disturbances: Disturbances | None
+    w: int, world: World, rules: Rules, plant: Plant, workspace: Workspace, disturbances: Disturbances | None
 ) -> None:
-    """Hulls of world w that have run into something are put at its surface, and lose their velocity into it.
+    """Move colliding hulls of world w to the surface, each of two by half, and remove their velocity into it.
 
-    Of two hulls each gives way by half. States are written, and their columns.
+    States and their columns are written.
     """
-    state, world_map, touch, obstacles = (
-        world.state,
-        world.world_map,
-        2.0 * rules.hull_radius,
-        obstacle_columns(own.obstacles),
-    )
+    state, world_map, touch = world.state, world.world_map, 2.0 * rules.hull_radius
+    obstacles = obstacle_columns(workspace.obstacles)
     for i in range(state.eta.shape[1]):
         if not state.alive[w, i]:
             continue
         clear = min(nearest_surface(i, state.eta[w, i, 0], state.eta[w, i, 1], obstacles)) > rules.hull_radius + ROUND_M
         for k in range(0 if clear else world_map.num_obstacles[w]):
             near = world_map.obstacles[w, k, 2] + rules.hull_radius
-            dx, dy = (
-                state.eta[w, i, 0] - world_map.obstacles[w, k, 0],
-                state.eta[w, i, 1] - world_map.obstacles[w, k, 1],
-            )
+            dx = state.eta[w, i, 0] - world_map.obstacles[w, k, 0]
+            dy = state.eta[w, i, 1] - world_map.obstacles[w, k, 1]
             if dx * dx + dy * dy < near * near:
                 d, n_x, n_y = length_and_direction(dx, dy)
                 displace(w, i, n_x, n_y, max(near - d - SINK_M, 0.0), world)
@@ -64,19 +58,19 @@ def stop_hulls(
                 push(w, i, n_x, n_y, impulse, world, plant, disturbances)
                 push(w, j, -n_x, -n_y, impulse, world, plant, disturbances)
     for i in range(state.eta.shape[1]):
-        load_one(w, i, state, own.now)
+        load_one(w, i, state, workspace.now)
 
 
 @compiled
 def length_and_direction(dx: float, dy: float) -> tuple[float, float, float]:
-    """Length of a vector and its direction; north for one of length 0."""
+    """Length of a vector [m] and its direction, a unit vector; north for length 0."""
     d = math.sqrt(dx * dx + dy * dy)
     return (d, dx / d, dy / d) if d > 0.0 else (0.0, 1.0, 0.0)
 
 
 @compiled_inner
 def displace(w: int, i: int, n_x: float, n_y: float, distance: float, world: World) -> None:
-    """Move a vehicle along a direction [m]."""
+    """Move a vehicle by a distance [m] along the unit vector n."""
     world.state.eta[w, i, 0] += distance * n_x
     world.state.eta[w, i, 1] += distance * n_y
 
@@ -85,7 +79,7 @@ def displace(w: int, i: int, n_x: float, n_y: float, distance: float, world: Wor
 def along(
     w: int, i: int, n_x: float, n_y: float, world: World, plant: Plant, disturbances: Disturbances | None
 ) -> tuple[float, float]:
-    """A vehicle's velocity over ground along a direction [m/s], and what an impulse adds to it [1/kg]."""
+    """A vehicle's velocity over ground along the unit vector n [m/s], and its change per impulse [1/kg]."""
     c, s = cos_sin(world.state.eta[w, i, 2])
     ahead, abeam = c * n_x + s * n_y, c * n_y - s * n_x
     speed = ahead * world.state.nu[w, i, 0] + abeam * world.state.nu[w, i, 1]
@@ -97,9 +91,10 @@ def along(
 
 @compiled_inner
 def push(
-    w: int, i: int, n_x: float, n_y: float, impulse: float, world: World, plant: Plant, disturbances: Disturbances | None
+    w: int, i: int, n_x: float, n_y: float, impulse: float, world: World, plant: Plant,
+    disturbances: Disturbances | None,
 ) -> None:  # fmt: skip
-    """Give a vehicle an impulse along a direction [N s], as its own inertia (Eq. 2) answers it."""
+    """Apply an impulse [N s] along the unit vector n to a vehicle, by its own inertia (Eq. 2)."""
     if disturbances is not None:
         plant = own_plant(w, i, disturbances.hull)
     c, s = cos_sin(world.state.eta[w, i, 2])

@@ -1,4 +1,4 @@
-"""Random streams as arrays, so that a snapshot of worlds can hold them."""
+"""States of random generators as arrays, for snapshots of worlds."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ _LOW = 2**64 - 1
 
 
 def packed(streams: Sequence[np.random.Generator | None]) -> UInt64:
-    """States of NumPy's default generators (PCG64), shape (stream, 6); zeros where there is none."""
+    """States of NumPy's default generators (PCG64), shape (stream, 6); zeros for None."""
     rows = np.zeros((len(streams), 6), np.uint64)
     for row, stream in zip(rows, streams, strict=True):
         if stream is not None:
@@ -21,7 +21,7 @@ def packed(streams: Sequence[np.random.Generator | None]) -> UInt64:
 
 
 def unpacked(rows: UInt64, num: int) -> list[np.random.Generator | None]:
-    """``num`` generators that go on from ``packed`` states. Raises ValueError where there are others."""
+    """``num`` generators that continue from ``packed`` states. Raises ValueError if the array doesn't fit."""
     if rows.shape != (num, 6) or rows.dtype != np.uint64:
         raise ValueError(f"streams must be uint64 of shape ({num}, 6), got {rows.dtype} of shape {rows.shape}")
     streams: list[np.random.Generator | None] = []

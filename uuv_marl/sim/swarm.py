@@ -1,4 +1,4 @@
-"""Swarm: any number of worlds, reset singly and stepped in one call. It seeds, draws and checks."""
+"""Swarm: any number of worlds, reset singly and stepped in one call; it seeds, samples and checks."""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -28,14 +28,14 @@ _log = logging.getLogger("uuv_marl")
 
 
 class Swarm:
-    """Worlds of one scenario, each with its own random stream.
+    """Worlds of one scenario, each with its own random generator.
 
-    ``state``, ``course`` and ``facts`` hold arrays whose first axis is the world. They and the returned percepts
-    are buffers that the next ``step`` or ``reset`` overwrites. A world's run depends on its seed and actions alone.
+    ``state``, ``world_map`` and ``facts`` hold arrays whose first axis is the world. They and the returned percepts
+    are buffers that the next ``step`` or ``reset`` overwrites. A world's run depends only on its seed and actions.
 
     Args:
-        scenario: what to simulate.
-        num_worlds: how many worlds a call steps.
+        scenario: scenario to simulate.
+        num_worlds: number of worlds that a call steps.
     """
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
@@ -44,7 +44,7 @@ class Swarm:
         self.num_vehicles = scenario.swarm.num_vehicles
         self.layout = PerceptLayout.of(scenario)
         self.task_fields = task_fields(scenario)
-        """Rows of the percept that the task writes, not the engine."""
+        """Fields of the percept that the task writes."""
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
         self._ready, self._warned = np.zeros(num_worlds, np.bool_), np.zeros(num_worlds, np.bool_)
         self._duration_s = np.zeros(num_worlds)
@@ -60,19 +60,18 @@ class Swarm:
         self._disturbances = make_disturbances(scenario, self.keys, self._sizes)
         self._engine = Engine(scenario, self._world, self._disturbances)
         self.task: Any = kind(self)
-        """What the swarm is to do, a ``uuv_marl.tasks.Task``. The water asks it what to draw, and lets it observe."""
+        """The ``uuv_marl.tasks.Task``, which samples episodes and writes its own fields of percepts."""
         self._task_memory: dict[str, NDArray[Any]] = {} if kind.Memory is None else self.task.memory._asdict()
 
     @property
     def percept(self) -> Percept:
-        """What every vehicle knows now, shape (world, vehicle, ...)."""
-        return Percept(
-            self._senses.percept, self.layout, Clock(self.facts.time_s, self.keys, self._seeds), self.state.alive
-        )
+        """Present percepts of all vehicles, shape (world, vehicle, ...)."""
+        clock = Clock(self.facts.time_s, self.keys, self._seeds)
+        return Percept(self._senses.percept, self.layout, clock, self.state.alive)
 
     @property
     def detected_index(self) -> Int32:
-        """Index of the vehicle heard in each sub-sector, -1 for none, shape (world, vehicle, sector)."""
+        """Index of the vehicle detected in each sub-sector, -1 for none, shape (world, vehicle, sector)."""
         return self._senses.detected_index
 
     @property
@@ -82,12 +81,12 @@ class Swarm:
 
     @property
     def own_reference(self) -> Float64:
-        """Place and velocity of every vehicle's l(t), north and east [m, m/s], shape (world, vehicle, 4)."""
+        """Position and velocity of every vehicle's l(t), north and east [m, m/s], shape (world, vehicle, 4)."""
         return np.take_along_axis(self.facts.reference, self.world_map.group[:, :, None], axis=1)
 
     @property
     def mean_reference(self) -> Float64:
-        """The mean of the groups' l(t): place and velocity, shape (world, 4)."""
+        """Mean of the groups' l(t): position [m] and velocity [m/s], shape (world, 4)."""
         return self.facts.reference.mean(axis=1)
 
     @property
@@ -97,15 +96,15 @@ class Swarm:
 
     @property
     def currents(self) -> Flow | None:
-        """How the water of each world moves; None if nothing disturbs the scenario.
+        """Current of each world; None without disturbances.
 
-        ``mean``, ``gust`` and ``eddies`` may be written between steps, for a current of your own: the water at the
-        vehicles is computed from them at the end of each control hold. A reset draws them anew.
+        ``mean``, ``gust`` and ``eddies`` may be written between steps, for a current of your own: the flow at the
+        vehicles is computed from them at the end of each control step. A reset samples them again.
         """
         return None if self._disturbances is None else self._disturbances.flow
 
     def flow_field(self, world: int = 0) -> FlowField:
-        """How the water of a world moves now: ``swarm.flow_field().at([[100.0, 200.0]])``, north and east [m]."""
+        """Present velocity field of a world's water, as in ``swarm.flow_field().at([[100.0, 200.0]])``."""
         if self._disturbances is None:
             return FlowField(np.zeros(2), np.zeros((0, 3)), self.scenario.current.eddy_core_m)
         return flow_field(world, self._disturbances.water.core, self._disturbances.flow)
@@ -121,7 +120,7 @@ class Swarm:
 
     @property
     def compass(self) -> Float64:
-        """Cosine and sine of every vehicle's heading as its own compass has it, shape (world, vehicle, 2)."""
+        """Cosine and sine of every vehicle's heading by its own compass, shape (world, vehicle, 2)."""
         if self._disturbances is None:
             return self.heading
         (c, s), (x, y) = np.moveaxis(self._disturbances.navigation_errors.bias, -1, 0), np.moveaxis(self.heading, -1, 0)
@@ -129,22 +128,19 @@ class Swarm:
 
     @property
     def duration_s(self) -> Float64:
-        """Time that l(t) takes to its end [s], no task time is shorter; shape (world,)."""
+        """Duration of l(t) up to its end [s], the least task time; shape (world,)."""
         return self._duration_s
 
     @property
     def time_limit_s(self) -> Float64:
-        """Time at which an episode is cut off [s], shape (world,)."""
+        """Time at which an episode is truncated [s], shape (world,)."""
         return self.scenario.time_limit.of(self.duration_s)
 
     @property
     def faulty(self) -> Bool:
-        """Vehicles that a fault of the scenario has hit since the reset, shape (world, vehicle)."""
-        return (
-            np.zeros_like(self.state.alive)
-            if self._disturbances is None
-            else hit(self.state.tick, self._disturbances.hull)
-        )
+        """Vehicles that a fault of the scenario has affected since the reset, shape (world, vehicle)."""
+        own = self._disturbances
+        return np.zeros_like(self.state.alive) if own is None else hit(self.state.tick, own.hull)
 
     @property
     def arrived(self) -> Bool:
@@ -152,11 +148,11 @@ class Swarm:
         return ~np.isnan(self.facts.arrival_s[:, 0])
 
     def endings(self) -> tuple[Bool, Bool]:
-        """How episodes ended, shape (world,) each; both False for episodes that go on.
+        """Whether episodes are terminated and truncated, shape (world,) each.
 
         Returns:
-            Terminated: the task is done (the swarm arrived, say), or all vehicles are lost.
-            Truncated: the time limit cut the episode off, or the world diverged.
+            Terminated: the task is done (the swarm has arrived, say), or all vehicles are lost.
+            Truncated: the time limit is reached, or the world diverged.
         """
         terminated = self.task.done() | ~self.state.alive.any(axis=1)
         late = self.facts.time_s >= self.time_limit_s - 1e-9
@@ -169,20 +165,20 @@ class Swarm:
         return terminated | truncated
 
     def divergence(self, world: int) -> str:
-        """What went wrong in a world that diverged, and the remedy."""
+        """Message about a world that diverged, with the remedy."""
         timing = self.scenario.timing
         return (
             f"vehicle {self.facts.diverged[world]} of world {world} diverged before {self.facts.time_s[world]:g} s: "
-            f"its speed ran away, because timing.integration_step_s = {timing.integration_step_s:g} is too long for "
+            f"its speed grew without limit: timing.integration_step_s = {timing.integration_step_s:g} is too long for "
             "this vehicle; use a smaller step, or weaker actuators"
         )
 
     def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> Percept:
-        """Start worlds anew.
+        """Reset worlds.
 
         Args:
             seed: world w starts from ``seed + w``; or a sequence with a seed or None for each of ``worlds``. Without a
-                seed a world's own stream goes on, or begins from fresh entropy.
+                seed a world's own generator continues, or starts from fresh entropy.
             worlds: indices of the worlds to reset, default all.
         """
         chosen = range(self.num_worlds) if worlds is None else worlds
@@ -197,39 +193,38 @@ class Swarm:
         self._rngs[w], self.keys[w] = rng, episode_key(rng)
         for array in self._task_memory.values():
             array[w] = 0
-        drawn: EpisodeSetup = self.task.draw(w, rng)
-        if drawn.duration_s > (longest := self.task.longest_s(self.scenario)) + 1e-9:
+        setup: EpisodeSetup = self.task.draw(w, rng)
+        if setup.duration_s > (longest := self.task.longest_s(self.scenario)) + 1e-9:
             raise ValueError(
-                f"task {self.scenario.task.name!r} drew duration_s = {drawn.duration_s:g}, and its longest_s gives "
+                f"task {self.scenario.task.name!r} drew duration_s = {setup.duration_s:g}, and its longest_s gives "
                 f"{longest:g}; override longest_s, so that every episode ends in time"
             )
-        state, world_map, m = self.state, self.world_map, len(drawn.obstacles)
-        for g, (waypoints, times) in enumerate(zip(drawn.waypoints, drawn.times, strict=True)):
+        state, world_map, m = self.state, self.world_map, len(setup.obstacles)
+        for g, (waypoints, times) in enumerate(zip(setup.waypoints, setup.times, strict=True)):
             points = len(waypoints)
             world_map.waypoints[w, g, :points], world_map.waypoints[w, g, points:] = waypoints, waypoints[-1]
             world_map.times[w, g, :points], world_map.times[w, g, points:] = times, times[-1]
             world_map.last[w, g] = points - 1
-        world_map.group[w], world_map.informed[w] = drawn.group, drawn.informed
-        self._duration_s[w] = drawn.duration_s
-        world_map.obstacles[w, :m], world_map.obstacles[w, m:] = drawn.obstacles, 0.0
+        world_map.group[w], world_map.informed[w] = setup.group, setup.informed
+        self._duration_s[w] = setup.duration_s
+        world_map.obstacles[w, :m], world_map.obstacles[w, m:] = setup.obstacles, 0.0
         world_map.num_obstacles[w] = m
         sample_traffic(w, self.keys[w], self.scenario, world_map)
-        state.eta[w], state.nu[w] = drawn.eta, drawn.nu
+        state.eta[w], state.nu[w] = setup.eta, setup.nu
         state.before[w] = state.eta[w, :, :2]
-        state.obstacles_before[w], state.obstacles_before[w, :m] = NOWHERE, drawn.obstacles
+        state.obstacles_before[w], state.obstacles_before[w, :m] = NOWHERE, setup.obstacles
         world_map.losses[w] = rng.permutation(self.num_vehicles)[: world_map.losses.shape[1]]
         state.alive[w], state.tick[w] = True, 0
         self._ready[w], self._warned[w] = True, False
         if self._disturbances is not None:
-            sample_disturbances(w, self.scenario, world_map, drawn.duration_s, self._disturbances)
+            sample_disturbances(w, self.scenario, world_map, setup.duration_s, self._disturbances)
         self._engine.observe(w)
         self.task.begin(w)
 
     def observe(self) -> Percept:
-        """Compute facts and percepts anew, as after a reset, once ``state`` or ``course`` was changed by hand.
+        """Compute facts and percepts again, as after a reset, once ``state`` or ``world_map`` was changed by hand.
 
-        If the sea is switched on, drift and late readings are forgotten: vehicles know their places again, and their
-        arrays begin to read. Current, forces, faults and messages go on.
+        With disturbances, drift and delayed readings are cleared; current, forces, faults and messages continue.
         """
         self._check_indices(self._arrays())
         for w in range(self.num_worlds):
@@ -238,21 +233,21 @@ class Swarm:
         return self.percept
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """A copy of all that a later run depends on, random streams included, for ``restore``."""
+        """A copy of all that a later run depends on, random generators included, for ``restore``."""
         return {name: array.copy() for name, array in self._arrays().items()} | {"streams": packed(self._rngs)}
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> Percept:
-        """Go on from a snapshot of a swarm of the same scenario and number of worlds.
+        """Continue from a snapshot of a swarm of the same scenario and number of worlds.
 
         Raises:
             ValueError: an array is missing, has another shape or type, or holds an index beyond its array.
         """
         arrays = self._arrays()
-        for name, (shape, kind) in {name: (a.shape, a.dtype) for name, a in arrays.items()}.items():
+        for name, array in arrays.items():
             saved = snapshot.get(name)
-            if saved is None or saved.shape != shape or saved.dtype != kind:
+            if saved is None or saved.shape != array.shape or saved.dtype != array.dtype:
                 got = "nothing" if saved is None else f"{saved.dtype} of shape {saved.shape}"
-                raise ValueError(f"the snapshot's {name} must be {kind} of shape {shape}, got {got}")
+                raise ValueError(f"the snapshot's {name} must be {array.dtype} of shape {array.shape}, got {got}")
         self._check_indices(snapshot)
         self._rngs = unpacked(snapshot.get("streams", np.zeros(0)), self.num_worlds)
         for name, array in arrays.items():
@@ -261,20 +256,19 @@ class Swarm:
         return self.percept
 
     def _check_indices(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Raise ValueError where a number that compiled code uses as an index, unchecked, leads out of its array."""
-        for table in (*self._world, *disturbance_tables(self._disturbances)):
+        """Raise ValueError where an index that compiled code uses unchecked is out of its array."""
+        for table in self._tables():
             check(cast(type[Any], type(table)), arrays, self._sizes)
+
+    def _tables(self) -> tuple[Any, ...]:
+        return (*self._world, *disturbance_tables(self._disturbances))
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         return {
             "duration_s": self._duration_s,
             "keys": self.keys,
             "seeds": self._seeds,
-            **{
-                k: array
-                for table in (*self._world, *disturbance_tables(self._disturbances))
-                for k, array in table._asdict().items()
-            },
+            **{name: array for table in self._tables() for name, array in table._asdict().items()},
             **{f"task.{name}": array for name, array in self._task_memory.items()},
         }
 
@@ -286,9 +280,8 @@ class Swarm:
         Args:
             action: shares of full surge force and yaw torque, shape (world, vehicle, 2), rounded to float32 and
                 projected onto the unit disc. Entries of lost vehicles are ignored.
-            active: worlds to step, shape (world,); the others stay as they are. Default all.
-            then: called with the first and the end of each range of worlds that has been stepped, by the thread that
-                stepped it.
+            active: worlds to step, shape (world,); the others stay unchanged. Default all.
+            on_stepped: called with start and end of each range of worlds that was stepped, by its thread.
         """
         action = action_array(action, (self.num_worlds, self.num_vehicles, 2), "action")
         if not np.isfinite(action).all() and not np.isfinite(action[self.state.alive]).all():
@@ -312,12 +305,14 @@ class Swarm:
         return self.percept
 
     def _write_task_fields(self, worlds: Bool) -> None:
-        """Write what the task lets the living of these worlds observe, shape (world,), into their percepts."""
+        """Write the task's fields into the percepts of the living of these worlds, shape (world,)."""
         if not self.task_fields:
             return
         rows, percept, observing = self.task.observe(worlds), self.percept, worlds[:, None] & self.state.alive
         for field in self.task_fields:
-            percept[field.name][observing] = np.clip(rows[field.name][observing], field.kind.low, field.kind.high)
+            percept[field.name][observing] = np.clip(
+                rows[field.name][observing], field.quantity.low, field.quantity.high
+            )
 
 
 def _sizes(scenario: Scenario, worlds: int, entries: int) -> dict[str, int]:

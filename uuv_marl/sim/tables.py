@@ -1,7 +1,7 @@
-"""Arrays declared once, in the NamedTuple that holds them: type, axes and meaning stand beside the name.
+"""Declarations of arrays in NamedTuples: type, axes and meaning beside the name.
 
 ``Annotated[Float64, "world vehicle 3", "Pose."]`` is an array of type float64 and shape (world, vehicle, 3). Memory,
-documentation and checks are made from that.
+documentation and checks follow from that.
 """
 
 import functools
@@ -16,19 +16,19 @@ T = TypeVar("T")
 
 
 class Bounds(NamedTuple):
-    """Allowed numbers: finite, from ``low`` to the last index of ``axis`` plus ``beyond``."""
+    """Allowed values: finite, from ``low`` to the last index of ``axis`` plus ``beyond``."""
 
     low: int
     axis: str = ""
     beyond: int = 0
 
     def high(self, sizes: Mapping[str, int]) -> float:
-        """The largest number allowed, with axes of these lengths."""
+        """Largest value allowed, with axes of these lengths."""
         return sizes[self.axis] - 1 + self.beyond if self.axis else float(np.finfo(np.float64).max)
 
 
 class ArraySpec(NamedTuple):
-    """One array of a table."""
+    """Declaration of one array of a table."""
 
     dtype: type[np.generic]
     axes: tuple[str, ...]
@@ -48,30 +48,30 @@ def array_specs(table: type[Any]) -> dict[str, ArraySpec]:
     for name, hint in get_type_hints(table, include_extras=True).items():
         axes, meaning, *bounds = hint.__metadata__
         dtype = hint.__origin__
-        while dtypes := get_args(dtype):  # the number's type is the last and innermost, in NumPy 2.5's new NDArray, too
+        while dtypes := get_args(dtype):  # the innermost last argument, also in NumPy 2.5's NDArray
             dtype = dtypes[-1]
         specs[name] = ArraySpec(dtype, tuple(axes.split()), meaning, bounds[0] if bounds else None)
     return specs
 
 
 def allocate(table: type[T], sizes: Mapping[str, int]) -> T:
-    """The table filled with zeros, its axes of these lengths."""
+    """A table of zeros, its axes of these lengths."""
     return table(**{name: np.zeros(spec.shape(sizes), spec.dtype) for name, spec in array_specs(table).items()})
 
 
 def described(table: C) -> C:
-    """Write each array's meaning, type and shape into the docstring of a table."""
+    """Add each array's meaning, shape and type to the docstring of a table."""
     lines = ["Attributes:"]
     for name, spec in array_specs(table).items():
         shape = ", ".join(spec.axes) + "," * (len(spec.axes) == 1)
         lines.append(f"    {name}: {spec.meaning} Shape ({shape}), {spec.dtype.__name__}.")
     table.__doc__ = "\n    ".join([f"{(table.__doc__ or '').strip()}\n", *lines])
-    table.__new__.__annotations__ = {}  # what help() shows as the signature: names alone
+    table.__new__.__annotations__ = {}  # so that help() shows only names in the signature
     return table
 
 
 def check(table: type[Any], arrays: Mapping[str, NDArray[Any]], sizes: Mapping[str, int]) -> None:
-    """Raise ValueError where a number that compiled code uses unchecked is out of its ``Bounds``."""
+    """Raise ValueError if a value that compiled code uses unchecked is out of its ``Bounds``."""
     for name, spec in array_specs(table).items():
         if spec.bounds is None:
             continue

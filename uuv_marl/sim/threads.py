@@ -1,8 +1,7 @@
-"""Threads that share the worlds of a batch: Python's own, which sleep while they have nothing to do.
+"""Python threads that share the worlds of a batch and sleep while idle.
 
-Compiled code lets go of Python's lock, so that they run at once. Numba's own threads are not used: they spin while they
-wait, which starves whatever else runs; in one of its layers the process ends where two threads enter it; and none of
-them survives a fork.
+Compiled code releases Python's lock, so that they run in parallel. Numba's own threads are not used: they spin while
+they wait, one of its threading layers aborts the process when two threads enter it, and none survives a fork.
 """
 
 import functools
@@ -19,7 +18,7 @@ Job = Callable[[], None]
 
 
 def num_threads() -> int:
-    """How many may work at once: ``NUMBA_NUM_THREADS``, by default as many as the process has cores."""
+    """Largest number of threads: ``NUMBA_NUM_THREADS``, by default the number of the process's cores."""
     return cast(Any, config).NUMBA_NUM_THREADS
 
 
@@ -30,25 +29,25 @@ def _serve(jobs: SimpleQueue[Job]) -> None:
 
 @functools.cache
 def _helpers() -> SimpleQueue[Job]:
-    """What helping threads, which begin with the first call, take their jobs from."""
+    """Queue of jobs for the helping threads, which the first call starts."""
     jobs: SimpleQueue[Job] = SimpleQueue()
     for k in range(1, max(num_threads(), 2)):
         Thread(target=_serve, args=(jobs,), name=f"uuv_marl {k}", daemon=True).start()
     return jobs
 
 
-if hasattr(os, "register_at_fork"):  # a child has none of its parent's threads
+if hasattr(os, "register_at_fork"):  # a forked child has none of its parent's threads
     os.register_at_fork(after_in_child=_helpers.cache_clear)
 
 
 def on_threads(work: Callable[[int, int, int], bool], amount: int, threads: int, head: int = 0) -> bool:
-    """Divide ``range(amount)`` among threads, the caller's own the first; whether any part of the work gave True.
+    """Divide ``range(amount)`` among threads, the caller's first; return whether any part of the work returned True.
 
     Args:
-        work: takes the thread's index, and the first and the end of its part.
-        amount: how much there is to do.
-        threads: into how many parts it is divided, at most ``num_threads()`` of which are done at once.
-        head: how much the caller does while the others wake.
+        work: function of the thread's index and of the start and end of its part.
+        amount: size of the work.
+        threads: number of parts, of which at most ``num_threads()`` run in parallel.
+        head: extra work of the caller while the others wake.
     """
     share = max(amount - head, 0) // threads
     ends = [amount - k * share for k in reversed(range(threads))]
@@ -65,7 +64,7 @@ def on_threads(work: Callable[[int, int, int], bool], amount: int, threads: int,
         _helpers().put(functools.partial(do, part))
     try:
         result = work(*parts[0])
-    finally:  # wait where an error or Ctrl-C ends the caller's part, too: all parts write to the same arrays
+    finally:  # also after an error or Ctrl-C, since all parts write to the same arrays
         others = [done.get() for _ in parts[1:]]
     for other in others:
         if isinstance(other, BaseException):

@@ -1,4 +1,4 @@
-"""The reference point l(t) (Eq. 5): constant speed along a polyline, then at rest at its end, or on beyond it."""
+"""The reference point l(t) (Eq. 5): constant speed along a polyline, then at rest at its end or beyond it."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from uuv_marl.types import Float64
 
 
 def arrival_times(waypoints: Float64, speed: float) -> Float64:
-    """Time [s] at which l(t) passes each waypoint. ``waypoints`` [m] has shape (point, 2); the result (point,)."""
+    """Time at which l(t) passes each waypoint [s], shape (point,). ``waypoints`` [m] has shape (point, 2)."""
     legs = np.hypot(*np.diff(waypoints, axis=0).T)
     return np.concatenate([[0.0], np.cumsum(legs)]) / speed
 
@@ -23,8 +23,8 @@ def reference(
         waypoints: corners of the trajectory, north and east [m], shape (point, 2).
         times: when l(t) passes them [s], shape (point,).
         last: index of the last corner; those beyond it are padding.
-        passes: whether it goes on along the last leg beyond the end, where it else rests (``arrival.criterion``); where it
-            is at the end from the start it rests.
+        passes: whether it moves on beyond the end instead of resting there (``arrival.criterion``); a reference that
+            starts at its end rests.
     """
     if t >= times[last] and (not passes or times[last] == 0.0):
         return waypoints[last, 0], waypoints[last, 1], 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Sine and cosine without branches or library calls, so that loops over vehicles run on vector registers.
+"""Sine and cosine without branches or library calls, so that loops over vehicles are vectorised.
 
 Cody and Waite's reduction to [-pi/4, pi/4], then the polynomials of Sun's fdlibm (k_sin.c, k_cos.c). Only IEEE sums,
 products and floors: the same bits on every machine, which a C library's sine does not promise.
@@ -38,9 +38,9 @@ def cos_sin(angle: float) -> tuple[float, float]:
 
 
 def rotated(points: Float64, c: float, s: float) -> Float64:
-    """Points (..., 2) turned by the angle that has this cosine and sine, with the same bits on every machine.
+    """Points, shape (..., 2), rotated by the angle with this cosine and sine, with the same bits on every machine.
 
-    As a matrix product of processors with fused multiply-add has it, and one of other processors has not.
+    Equal to a matrix product with fused multiply-add.
     """
     x, y = np.moveaxis(points, -1, 0)
     return np.stack([_fused(y, -s, x * c), _fused(y, c, x * s)], axis=-1)
@@ -49,13 +49,13 @@ def rotated(points: Float64, c: float, s: float) -> Float64:
 def _fused(a: Float64, b: float, c: Float64) -> Float64:
     """``a * b + c``, rounded once."""
     high, (a_1, a_2), (b_1, b_2) = a * b, _halves(a), _halves(b)
-    low = ((a_1 * b_1 - high) + a_1 * b_2 + a_2 * b_1) + a_2 * b_2  # what the product was rounded by (Dekker 1971)
+    low = ((a_1 * b_1 - high) + a_1 * b_2 + a_2 * b_1) + a_2 * b_2  # rounding error of the product (Dekker 1971)
     parts = zip(np.ravel(high), np.ravel(low), np.ravel(c), strict=True)
     return np.reshape([math.fsum(each) for each in parts], np.shape(a))
 
 
 def _halves(x: Float64 | float) -> tuple[Float64 | float, Float64 | float]:
-    """Two numbers of 26 bits each, whose sum this is."""
+    """Two numbers of 26 bits each whose sum is x."""
     far = 134_217_729.0 * x  # 2^27 + 1
     high = far - (far - x)
     return high, x - high

@@ -1,7 +1,7 @@
-"""One world, compiled: move, lose, measure, judge arrival, hear. ``Swarm`` holds the arrays it works on.
+"""The step of one world, compiled: motion, losses, distances, arrival, sonar. ``Swarm`` owns the arrays.
 
-Every array's first axis is the world; each function touches the rows of one world only, so that a world's run never
-depends on its neighbours in the batch.
+Every array's first axis is the world. Each function accesses one world only, so that results never depend on the others
+in the batch.
 """
 
 import math
@@ -19,7 +19,7 @@ from uuv_marl.sim.disturbances.disturbances import (
     integrate_disturbed,
     reads,
     take_readings,
-)
+)  # fmt: skip
 from uuv_marl.sim.model import Model, Rules
 from uuv_marl.sim.motion import apply_actuators, integrate, load_action, load_one, load_state
 from uuv_marl.sim.nearby import load_obstacles, load_places, remember_nearby
@@ -29,23 +29,22 @@ from uuv_marl.sim.stopping import stop_hulls
 from uuv_marl.sim.traffic import triangle
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import disturbance_fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Workspace
 from uuv_marl.types import Float32, Float64
 
 RUNAWAY = 1000.0
-"""A vehicle whose velocities (surge, sway [m/s], yaw rate [rad/s]) add up to this has diverged. Assumed: no vehicle
-under water is a hundredth as fast."""
+"""A vehicle has diverged if |u| + |v| + |r| [m/s, m/s, rad/s] reaches this. Assumed: a hundred times any real one."""
 
 
 @compiled_inner
 def integrate_control_step(
     w: int, first: bool, world: World, model: Model, now: Columns, disturbances: Disturbances | None
 ) -> None:
-    """Actions become forces, forces become motion. Eq. 1-4, 22-24.
+    """Apply the actions' forces and integrate the motion of one control step. Eq. 1-4, 22-24.
 
-    ``first`` says whether the decision was made at the start of this hold; later ones keep its force's direction in the
-    world. States and facts are written.
+    ``first`` says whether it is the first of its decision; later ones keep the force's direction in the world. States
+    and facts are written.
     """
     state, facts, rules = world.state, world.facts, model.rules
     apply_actuators(first, now, model.plant)
@@ -57,7 +56,7 @@ def integrate_control_step(
         state.before[w, i, 0], state.before[w, i, 1] = state.eta[w, i, 0], state.eta[w, i, 1]
         if not state.alive[w, i]:
             continue
-        if not abs(now.u[i]) + abs(now.v[i]) + abs(now.r[i]) < RUNAWAY:  # so asked, NaN counts as too fast
+        if not abs(now.u[i]) + abs(now.v[i]) + abs(now.r[i]) < RUNAWAY:  # "not <" includes NaN
             if facts.diverged[w] < 0:
                 facts.diverged[w] = i
             load_one(w, i, state, now)
@@ -71,7 +70,7 @@ def integrate_control_step(
 
 @compiled_inner
 def apply_losses(w: int, world: World, rules: Rules, disturbances: Disturbances | None) -> None:
-    """Vehicles whose scheduled time has come fall silent and stop. The sea's faults may lose vehicles, too."""
+    """Lose the vehicles with a loss scheduled now, and those lost to faults."""
     if disturbances is not None:
         for i in range(world.state.alive.shape[1]):
             if is_lost_to_fault(w, i, world.state.tick[w], disturbances.actuation, disturbances.hull):
@@ -83,7 +82,7 @@ def apply_losses(w: int, world: World, rules: Rules, disturbances: Disturbances 
 
 @compiled_inner
 def lose_vehicle(w: int, i: int, world: World) -> None:
-    """Lose one vehicle."""
+    """Mark a vehicle as lost and set its velocity to 0."""
     if world.state.alive[w, i]:
         world.state.alive[w, i] = False
         world.state.nu[w, i] = 0.0
@@ -92,30 +91,23 @@ def lose_vehicle(w: int, i: int, world: World) -> None:
 
 @compiled_inner
 def move_obstacles(w: int, tick: int, world_map: WorldMap, control_step_s: float) -> None:
-    """Obstacles go on, those that move, for one control hold; ``tick`` counts it."""
+    """Move the moving obstacles by one control step, which ``tick`` counts."""
     for k in range(world_map.num_obstacles[w]):
         if world_map.swing_control_steps[w, k] > 0:
             ahead = triangle(tick, world_map.swing_control_steps[w, k])
             speed = ahead - triangle(tick - 1, world_map.swing_control_steps[w, k])
             for c in range(2):
-                world_map.obstacles[w, k, c] = (
-                    world_map.swing[w, k, c] + ahead * control_step_s * world_map.swing[w, k, 2 + c]
-                )
-                world_map.obstacle_velocity[w, k, c] = speed * world_map.swing[w, k, 2 + c]
+                start, velocity = world_map.swing[w, k, c], world_map.swing[w, k, 2 + c]
+                world_map.obstacles[w, k, c] = start + ahead * control_step_s * velocity
+                world_map.obstacle_velocity[w, k, c] = speed * velocity
         elif world_map.obstacle_velocity[w, k, 0] != 0.0 or world_map.obstacle_velocity[w, k, 1] != 0.0:
             world_map.obstacles[w, k, 0] += world_map.obstacle_velocity[w, k, 0] * control_step_s
             world_map.obstacles[w, k, 1] += world_map.obstacle_velocity[w, k, 1] * control_step_s
 
 
 @compiled_inner
-def sort_into_cells(w: int, world: World, model: Model, workspace: Workspace) -> Grid:
-    """Sort the living into cells; where these lie."""
-    return sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
-
-
-@compiled_inner
 def measure_distances(w: int, world: World, model: Model, workspace: Workspace, grid: Grid) -> int:
-    """Distances of the living, folded into the facts of the step; how many contact episodes began now."""
+    """Update the facts of distances and collisions of the living; return the number of new collisions."""
     facts, hull_radius = world.facts, model.rules.hull_radius
     began = measure_vehicles(w, hull_radius, world, workspace.cells, grid)
     began += measure_obstacles(w, hull_radius, world, workspace.obstacles, workspace.cells, grid)
@@ -128,11 +120,11 @@ def measure_distances(w: int, world: World, model: Model, workspace: Workspace, 
 
 @compiled_inner
 def check_group(w: int, g: int, world: World, rules: Rules) -> tuple[float, float, int, float, float, bool]:
-    """Where a group's reference is, and how far its vehicles and their centre are from where they are to arrive.
+    """Update a group's reference and its vehicles' distances from it.
 
     Returns:
-        Sums of the living's positions [m], how many live, the largest distance of one of them from the end, and that of
-        their centre [m], and whether l(t), or in passage the centre, has come to the end.
+        Sums of the living vehicles' positions [m], their number, the largest distance of one of them from the end, that
+        of their centre [m], and whether l(t), or with ``arrival.criterion = passage`` the centre, is at the end.
     """
     state, world_map, facts = world.state, world.world_map, world.facts
     t, last, l_t = facts.time_s[w], world_map.last[w, g], facts.reference[w, g]
@@ -160,7 +152,7 @@ def check_group(w: int, g: int, world: World, rules: Rules) -> tuple[float, floa
 
 @compiled_inner
 def check_arrival(w: int, world: World, rules: Rules) -> None:
-    """Where references and the swarm's centre are, and whether the swarm, all its groups, has arrived."""
+    """Update references, the swarm's centre, and whether all groups have arrived."""
     state, facts = world.state, world.facts
     facts.time_s[w] = state.tick[w] * rules.control_step_s
     x, y, living, far, error, at_end = 0.0, 0.0, 0, 0.0, 0.0, True
@@ -183,7 +175,7 @@ def check_arrival(w: int, world: World, rules: Rules) -> None:
 
 @compiled_inner
 def passed(x: float, y: float, waypoints: Float64, last: int) -> tuple[float, float, bool]:
-    """The point of the last leg, prolonged, that is nearest to another [m], and whether it lies beyond the end."""
+    """Projection of a point onto the line of the last leg [m], and whether it lies beyond the end."""
     end_x, end_y = waypoints[last, 0], waypoints[last, 1]
     leg_x, leg_y = end_x - waypoints[last - 1, 0], end_y - waypoints[last - 1, 1]
     along = ((x - end_x) * leg_x + (y - end_y) * leg_y) / (leg_x * leg_x + leg_y * leg_y)
@@ -192,15 +184,15 @@ def passed(x: float, y: float, waypoints: Float64, last: int) -> tuple[float, fl
 
 @compiled_inner
 def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Grid, detects: bool) -> None:
-    """What the living hear, and everybody's percept.
+    """Update detections and percepts of all vehicles.
 
-    Without ``listens`` earlier readings stand, so that nobody need listen now.
+    ``detects`` is False where later code replaces the detections by earlier readings.
     """
     state, senses, now = world.state, world.senses, workspace.now
     see = fields(senses.percept, model.at)
     for i in range(state.alive.shape[1]):
         senses.heading[w, i, 0], senses.heading[w, i, 1] = now.cos[i], now.sin[i]
-        if not state.alive[w, i]:  # its columns have moved on, its state has not
+        if not state.alive[w, i]:  # its columns move on, its state doesn't
             senses.heading[w, i, 0], senses.heading[w, i, 1] = cos_sin(state.eta[w, i, 2])
             senses.detected_index[w, i] = -1
             senses.percept[w, i] = 0.0
@@ -217,7 +209,7 @@ def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Gri
 
 @compiled_inner
 def clear_facts(w: int, facts: Facts) -> None:
-    """Forget the step before."""
+    """Reset the facts of a step."""
     for i in range(facts.away.shape[1]):
         facts.away_before[w, i] = facts.away[w, i]
     facts.spacing[w] = math.inf
@@ -232,40 +224,34 @@ def clear_facts(w: int, facts: Facts) -> None:
 
 
 @compiled_inner
-def observe_world(w: int, world: World, model: Model, own: Workspace, disturbances: Disturbances | None) -> None:
-    """Facts and percepts of a world that has just been reset. Facts, senses and ``state.dwell`` are written."""
+def observe_world(w: int, world: World, model: Model, workspace: Workspace, disturbances: Disturbances | None) -> None:
+    """Compute facts and percepts of a world after a reset; ``state.dwell`` is written, too."""
     clear_facts(w, world.facts)
     world.state.dwell[w] = 0
     world.state.collided[w] = False
     world.facts.arrival_s[w] = math.nan
     world.facts.diverged[w] = -1
-    load_state(w, world.state, own.now)
-    load_obstacles(w, world.world_map, own.obstacles)
-    grid = sort_into_cells(w, world, model, own)
-    measure_distances(w, world, model, own, grid)
+    load_state(w, world.state, workspace.now)
+    load_obstacles(w, world.world_map, workspace.obstacles)
+    grid = sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
+    measure_distances(w, world, model, workspace, grid)
     check_arrival(w, world, model.rules)
     for i in range(world.facts.away.shape[1]):
         world.facts.away_before[w, i] = world.facts.away[w, i]
-    perceive(w, world, model, own, grid, True)
+    perceive(w, world, model, workspace, grid, True)
     if disturbances is not None:
         begin_disturbances(w, world, disturbances)
-        take_readings(w, world, disturbances, fields(world.senses.percept, model.at))
-        apply_disturbances(
-            w,
-            world,
-            disturbances,
-            fields(world.senses.percept, model.at),
-            disturbance_fields(world.senses.percept, model.at),
-        )
+        take_readings(w, world, model.at, disturbances)
+        apply_disturbances(w, world, model.at, disturbances)
 
 
 @compiled_inner
 def control_step(
     w: int, first: bool, world: World, model: Model, workspace: Workspace, disturbances: Disturbances | None
 ) -> Grid:
-    """One control hold of a world and what becomes true by it; where the cells of the living lie afterwards.
+    """Advance a world by one control step and update its facts; return the grid of the living.
 
-    ``first`` is that of ``control_hold``.
+    ``first`` is that of ``integrate_control_step``.
     """
     integrate_control_step(w, first, world, model, workspace.now, disturbances)
     world.state.tick[w] += 1
@@ -274,13 +260,13 @@ def control_step(
     load_places(w, world.world_map, workspace.obstacles)
     if model.rules.collision_stops:
         stop_hulls(w, world, model.rules, model.plant, workspace, disturbances)
-    grid = sort_into_cells(w, world, model, workspace)
+    grid = sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
     began = measure_distances(w, world, model, workspace, grid)
     if model.rules.collision_ends and began > 0:
         for i in range(world.state.alive.shape[1]):
             if world.facts.vehicle_collisions[w, i] > 0:
                 lose_vehicle(w, i, world)
-        grid = sort_into_cells(w, world, model, workspace)
+        grid = sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
     check_arrival(w, world, model.rules)
     return grid
 
@@ -289,7 +275,7 @@ def control_step(
 def step_world(
     w: int, action: Float32, world: World, model: Model, workspace: Workspace, disturbances: Disturbances | None
 ) -> None:
-    """One decision period of a world. A world that has diverged stays as it is."""
+    """Advance a world by one decision period, unless it has diverged."""
     facts, control_steps = world.facts, model.rules.control_steps
     if facts.diverged[w] >= 0:
         return
@@ -310,13 +296,7 @@ def step_world(
         if due or control_step_index == control_steps - 1:
             perceive(w, world, model, workspace, grid, due or disturbances is None or disturbances.sonar_timing.ideal)
             if disturbances is not None:
-                take_readings(w, world, disturbances, fields(world.senses.percept, model.at))
+                take_readings(w, world, model.at, disturbances)
     facts.saturated[w] /= max(num_alive * control_steps, 1)
     if disturbances is not None:
-        apply_disturbances(
-            w,
-            world,
-            disturbances,
-            fields(world.senses.percept, model.at),
-            disturbance_fields(world.senses.percept, model.at),
-        )
+        apply_disturbances(w, world, model.at, disturbances)

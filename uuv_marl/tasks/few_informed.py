@@ -1,17 +1,18 @@
-"""``few_informed``: few vehicles perceive l(t); the others must follow by what their sonar hears of the swarm."""
+"""``few_informed``: few vehicles perceive l(t); the others must follow the swarm by sonar detections."""
 
 from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
 import numpy as np
 
-from uuv_marl.percept import FLAG, PerceptField, Table
+from uuv_marl.percept import FLAG, FieldTable, PerceptField
 from uuv_marl.scenario.fields import Positive, within
 from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.tasks.reach import Reach, ReachNumbers
-from uuv_marl.tasks.task import Task, Terms
+from uuv_marl.tasks.reward import Terms
+from uuv_marl.tasks.task import Task
 from uuv_marl.types import Bool
 
 
@@ -19,37 +20,38 @@ class FewInformedNumbers(ReachNumbers):
     """Numbers of ``few_informed``."""
 
     near_m: Positive = 80.0
-    """A vehicle is there within this distance of l(t)'s end. Assumed: the paper's ``arrival.spread_m``."""
+    """A vehicle is at its goal within this distance of l(t)'s end. Assumed: the paper's ``arrival.spread_m``."""
     informed: Annotated[int, within(1, 16_384)]
-    """How many vehicles perceive l(t), drawn for each episode; all where there are fewer."""
+    """Number of vehicles that perceive l(t), sampled for each episode; all if there are fewer."""
+
+
+_TERMS = {
+    **Reach.rewards["dense"],
+    "arrival": "+w once, when the vehicle is first within near_m of l(t), which rests at its end",
+    "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to l(t), perceived or not, D: "
+    "progress_far_m, c: progress_m",
+}
 
 
 class FewInformed(Reach):
-    """Be within ``near_m`` of l(t)'s end at the time limit, untouched, though only ``informed`` vehicles perceive l(t).
+    """Be within ``near_m`` of l(t)'s end at the time limit, collision-free; only ``informed`` vehicles perceive l(t).
 
-    For the others the reference and its velocity read zero, and the start is turned at random against the first leg, so
-    that nothing tells them the way but the motion of those whom they hear. They are paid as the informed are: by how
-    near l(t) is. The headline is ``uninformed_share``.
+    For the others the reference and its velocity are zero, and the start is turned at random against the first leg, so
+    that only the motion of the vehicles that they detect shows the direction. All have the same reward.
     """
 
     Numbers = FewInformedNumbers
     reference_label: ClassVar[str] = Task.reference_label
-    observed: ClassVar[Table] = (
+    observed: ClassVar[FieldTable] = (
         PerceptField("informed", (1,), FLAG, "1 if the vehicle perceives l(t); 0 if its reference always reads 0"),
     )
-    rewards: ClassVar[tuple[str, ...]] = ("dense", "leader")
-    terms: ClassVar[Mapping[str, str]] = {
-        **Reach.terms,
-        "arrival": "+w once, when the vehicle is first within near_m of l(t), which rests at its end",
-        "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to l(t), perceived or not, D: "
-        "progress_far_m, c: progress_m",
-    }
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": _TERMS, "leader": _TERMS}
     headline: ClassVar[str] = "uninformed_share"
     columns: ClassVar[Mapping[str, str]] = {"uninformed_share": "share of the uninformed vehicles that succeed [1]"}
     reference_policy: ClassVar[str] = "leader_follower"
 
     def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
-        """As the scenario says; the start is turned, obstacles in it are left out, and the informed are drawn."""
+        """The scenario's own, but the start is turned, without obstacles in it, and informed vehicles are sampled."""
         drawn, scenario, n = Task.draw(self, world, rng), self.swarm.scenario, self.swarm.num_vehicles
         (first, second), (c, s) = drawn.waypoints[0][:2], cos_sin(rng.uniform(-np.pi, np.pi))
         ahead = first + rotated(second - first, c, s)
@@ -62,11 +64,11 @@ class FewInformed(Reach):
         return drawn._replace(obstacles=drawn.obstacles[np.array(clear, np.bool_)], eta=eta, nu=nu, informed=informed)
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
-        """Who is informed."""
+        """Whether each vehicle is informed."""
         return {"informed": self.swarm.world_map.informed[:, :, None].astype(np.float64)}
 
     def reward(self, running: Bool) -> Terms:
-        """With the reward ``led`` the informed are paid the mean of all, but for their own loss; the others as ever."""
+        """With ``leader`` each informed vehicle gets the mean of each term over all vehicles, except ``loss``."""
         terms, informed = super().reward(running), self.swarm.world_map.informed
         if self.reward_name != "leader":
             return terms
@@ -74,15 +76,15 @@ class FewInformed(Reach):
         return mean | {"loss": terms["loss"]}
 
     def at_goal(self) -> Bool:
-        """Vehicles within ``near_m`` of l(t), once it rests at its end."""
+        """Vehicles within ``near_m`` of l(t) once it rests at its end."""
         return (self.swarm.facts.time_s >= self.swarm.duration_s)[:, None] & super().at_goal()
 
     def done(self) -> Bool:
-        """No world: the time limit ends the episode, so that passing by is not enough."""
-        return Task.done(self)
+        """No world: the time limit ends the episode, so that vehicles must stay."""
+        return np.zeros(self.swarm.num_worlds, np.bool_)
 
     def metrics(self, world: int) -> dict[str, float | None]:
-        """Also the headline; None where all are informed."""
+        """Also the headline; None if all are informed."""
         uninformed = ~self.swarm.world_map.informed[world]
         share = float(self.succeeded()[world, uninformed].mean()) if uninformed.any() else None
         return {**super().metrics(world), "uninformed_share": share}

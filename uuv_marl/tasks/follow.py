@@ -1,11 +1,10 @@
 """``follow``: the paper's task. The swarm follows l(t) around obstacles and comes to rest at its end.
 
-Its two rewards, ``dense`` and ``sparse``, are named terms, weighted by the scenario, and their sum. Laws that hold by
-construction: an earlier arrival of the same way never pays less, since costs per second are at most zero, progress sums
-to what is left at the start, and an arrival pays once. Who moves and comes back gains nothing. A vehicle never gains
-from its own loss, unless it would have collided again and again: a lost vehicle is charged the worst that those terms
-could have cost it in the rest of the episode, an arrival, and a collision. No term depends on the number of vehicles.
-One weakness remains: if a straggler keeps the swarm from arriving, the others gain from its loss.
+Properties of both rewards: an earlier arrival along the same path never lowers the return, since costs per second are
+at most zero, progress sums to the distance at the start, and an arrival is rewarded once. Moving away and back gains
+nothing. A vehicle never gains from its own loss, unless it would have collided many times: it is charged the most that
+the terms could have cost it in the rest of the episode, an arrival and a collision. No term depends on the number of
+vehicles. A weakness: if one vehicle keeps the swarm from arriving, the others gain from its loss.
 """
 
 import math
@@ -17,61 +16,74 @@ import numpy as np
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Facts, State
 from uuv_marl.sim.compiled import compiled
+from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.task import StepReward, Task, Terms
+from uuv_marl.tasks.reward import StepReward, Terms
+from uuv_marl.tasks.task import Task
 from uuv_marl.types import Bool, Float64
 
 TRACKING, OBSTACLE, SPACING, EFFORT, COLLISION, LOSS, ARRIVAL, PROGRESS = range(8)
-"""Place of each term in arrays of all; ``sparse`` has no progress."""
+_TERMS = {
+    "tracking": "-w · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's distance to l(t)",
+    "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
+    "spacing": "-w · dt · clip(1 - d/s_u, 0, 1); d: distance to the nearest vehicle",
+    "effort": "-w · dt · a²; a²: mean squared length of the action, 1 at full force",
+    "collision": "-w for every collision that begins",
+    "loss": "once, for a lost vehicle: -(w_collision + w_arrival + (w_tracking + w_obstacle + w_spacing + "
+    "w_effort) · T), T: time left until the limit; in dense also what is left of progress, -(D - min(d, D))/c",
+    "arrival": "+w for every vehicle when the swarm arrives",
+    "progress": "dense alone: Phi now - Phi before, with Phi = -min(d, D)/c, and 0 once the swarm has arrived; "
+    "d: the vehicle's distance to l(t), D: progress_far_m, c: progress_m",
+}
+"""Each term of ``dense``; ``sparse`` has all but the last."""
 
 
 class Follow(Task):
-    """Follow l(t) and arrive together: ``arrival`` and ``time_limit`` of the scenario say when that is done."""
+    """Follow l(t) and arrive together, as ``arrival`` and ``time_limit`` of the scenario define it."""
 
-    rewards: ClassVar[tuple[str, ...]] = ("dense", "sparse")
     ending: ClassVar[str] = "arrival"
-    terms: ClassVar[Mapping[str, str]] = {
-        "tracking": "-w · dt · clip(d/s_l - 1, 0, 1); d: the vehicle's distance to l(t)",
-        "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
-        "spacing": "-w · dt · clip(1 - d/s_u, 0, 1); d: distance to the nearest vehicle",
-        "effort": "-w · dt · a²; a²: mean squared length of the action, 1 at full force",
-        "collision": "-w for every collision that begins",
-        "loss": "once, for a lost vehicle: -(w_collision + w_arrival + (w_tracking + w_obstacle + w_spacing + "
-        "w_effort) · T), T: time left until the limit; in dense also what is left of progress, -(D - min(d, D))/c",
-        "arrival": "+w for every vehicle when the swarm arrives",
-        "progress": "dense alone: Phi now - Phi before, with Phi = -min(d, D)/c, and 0 once the swarm has arrived; "
-        "d: the vehicle's distance to l(t), D: progress_far_m, c: progress_m",
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "dense": _TERMS,
+        "sparse": {name: formula for name, formula in _TERMS.items() if name != "progress"},
     }
 
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
         self._weights = reward_weights(swarm.scenario)
 
-    def step_reward(self, name: str, running: Bool, *, keep_terms: bool = True) -> StepReward:
-        """Pay while worlds are stepped: the weighted terms of ``dense``, or those of ``sparse``."""
+    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
+        """The scenario's own start, trajectory and obstacles."""
+        return super().draw(world, rng)
+
+    def step_reward(self, running: Bool, *, keep_terms: bool = True) -> StepReward:
+        """The compiled reward, filled while worlds are stepped, unless a subclass defines its own ``reward``."""
+        own = type(self).reward is not Follow.reward
+        return super().step_reward(running) if own else self._compiled(running, keep_terms)
+
+    def _compiled(self, running: Bool, keep_terms: bool = True) -> StepReward:
         swarm = self.swarm
         worlds, n = swarm.num_worlds, swarm.num_vehicles
-        terms = np.zeros((len(self.terms) - (name == "sparse"), worlds if keep_terms else 0, n))
+        terms = np.zeros((len(_TERMS) - (self.reward_name == "sparse"), worlds if keep_terms else 0, n))
         reward, limit_s = np.zeros((worlds, n)), swarm.time_limit_s
 
         def fill(begin: int, end: int) -> None:
             _fill_some(begin, end, running, limit_s, swarm.state, swarm.facts, self._weights, terms, reward)
 
-        return StepReward(reward, terms, fill)
+        return StepReward(reward, terms, fill, concurrent=True)
 
     def reward(self, running: Bool) -> Terms:
         """The weighted terms of the latest step; zero for vehicles lost before."""
-        step_reward = self.step_reward("dense", running)
+        step_reward = self._compiled(running)
         step_reward.fill(0, self.swarm.num_worlds)
-        return dict(zip(self.terms, step_reward.terms, strict=True))
+        return dict(zip(_TERMS, step_reward.terms, strict=False))
 
     def done(self) -> Bool:
         """Worlds whose swarm has arrived, unless ``arrival.ends_episode`` is false."""
         return self.swarm.arrived & self.swarm.scenario.arrival.ends_episode
 
     def at_goal(self) -> Bool:
-        """All vehicles of a swarm that has arrived: the paper's success is the swarm's."""
+        """All vehicles of a swarm that has arrived: the paper defines success for the swarm."""
         return np.broadcast_to(self.swarm.arrived[:, None], self.swarm.state.alive.shape)
 
     def arrived(self, world: int) -> bool:
@@ -79,11 +91,11 @@ class Follow(Task):
         return bool(self.swarm.arrived[world])
 
     def metrics(self, world: int) -> dict[str, float | None]:  # noqa: ARG002
-        """None beyond those of every run (``uuv_marl.benchmark.metrics``), which were made for this task."""
+        """None beyond those of every run (``uuv_marl.benchmark.metrics``)."""
         return {}
 
-    def success(self, world: int, vehicle: int | None = None) -> bool:  # noqa: ARG002 - the whole swarm's
-        """Whether the swarm has arrived, whatever it has touched: the paper's success."""
+    def success(self, world: int, vehicle: int | None = None) -> bool:  # noqa: ARG002 - the swarm's
+        """Whether the swarm has arrived, with or without collisions: the paper's success."""
         return self.arrived(world)
 
 
@@ -103,7 +115,7 @@ class RewardWeights(NamedTuple):
     s_o_m: float
     s_u_m: float
     settled_s: float
-    """The step that arrives ends less than this after ``Facts.arrival_s``, and every later one after it."""
+    """The step of the arrival ends less than this after ``Facts.arrival_s``, later steps end more."""
 
 
 def reward_weights(scenario: Scenario) -> RewardWeights:

@@ -1,4 +1,4 @@
-"""Who goes where in an episode, and who knows of it, for pictures."""
+"""The groups of an episode, their paths and informed vehicles, for pictures."""
 
 from typing import NamedTuple
 
@@ -12,16 +12,16 @@ class Groups(NamedTuple):
     """The groups of an episode that have vehicles."""
 
     team: Int64
-    """Team of each vehicle, which pictures show in one of four colours, 0 to 3, shape (vehicle,)."""
+    """Team of each vehicle, 0 to 3, which pictures show in one of four colours, shape (vehicle,)."""
     informed: Bool
     """Whether a vehicle perceives its reference, shape (vehicle,)."""
     paths: dict[int, tuple[int | None, Float64]]
-    """By the group's index its team, None for one group alone, and the corners of its trajectory, north and east [m],
-    shape (point, 2); of several groups, or where the task leads nowhere, only the last where it rests."""
+    """By the group's index its team, None for a single group, and the corners of its trajectory, north and east [m],
+    shape (point, 2); only the last corner of a reference at rest, if there are several groups or no goal."""
 
 
 def groups_of(swarm: Swarm, w: int = 0) -> Groups:
-    """The groups of a world as it was drawn."""
+    """The groups of a world."""
     world_map, team, paths = swarm.world_map, np.asarray(swarm.task.teams(w), np.int64) % 4, {}
     indices, first = np.unique(world_map.group[w], return_index=True)
     for g, i in zip(indices.tolist(), first.tolist(), strict=True):

@@ -1,4 +1,4 @@
-"""``hard_water``: closed water with walls, drawn by seed, through which every swarm can pass, if it finds the way."""
+"""``hard_water``: closed water with walls, sampled by seed, with a collision-free path for every vehicle."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import AfterValidator
 
-from uuv_marl.percept import Table
+from uuv_marl.percept import FieldTable
 from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.scenario.fields import Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -14,26 +14,26 @@ from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin, rotated
-from uuv_marl.tasks.maps import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, Pocket
 from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cells, reached
 from uuv_marl.tasks.maps.guidance import NUM_WALLS, PATH_FIELDS, write_path
+from uuv_marl.tasks.maps.kinds import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, Pocket
 from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, banks, between, joined
 from uuv_marl.tasks.reach import Reach, ReachNumbers
-from uuv_marl.tasks.task import Terms
+from uuv_marl.tasks.reward import Terms
 from uuv_marl.types import Bool, Float64, Int64
 
 MOST_DISCS = 320
 """Most discs of a map."""
 MOST_TRIES = 1000
-"""Maps that are drawn before the numbers are refused."""
+"""Maps that are sampled before the numbers are refused."""
 FAR_M = 5000.0
-"""Length of a way where there is none [m]."""
+"""Length of a path where there is none [m]."""
 QUEUE_S = 0.8
-"""Time [s] that each vehicle of a swarm adds to the way's in the time limit: at a gap they pass one by one. Assumed:
-they follow each other at s_u, 4 m, and 5 m/s."""
+"""Time [s] that each vehicle adds to the time limit, since vehicles pass a gap one by one. Assumed: they follow each
+other at s_u, 4 m, and 5 m/s."""
 _DEAR_M, _DEAR, _NARROW = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0), 0.5, 20.0
-"""Nearer to a surface than each of these [m], a way that leads (``lead``) costs so much more, and nearer than the
-clearance that each map has, so much. Tried by hand."""
+"""Distances to a surface [m], each of which adds the next number to a path's cost per length; what the map's own
+clearance adds. Tried by hand."""
 _AROUND = np.indices((3, 3)).reshape(2, 9, 1) - 1
 """Rows and columns from a cell to itself and to its eight neighbours."""
 
@@ -49,25 +49,25 @@ class HardWaterNumbers(ReachNumbers):
     """Numbers of ``hard_water``; the scenario's file has their sources."""
 
     kinds: Annotated[tuple[str, ...], AfterValidator(_known)]
-    """Kinds of maps, each drawn as often as the others."""
+    """Kinds of maps, equally likely."""
     length_m: Range
-    """From the start to the goal."""
+    """Distance from the start to the goal."""
     half_width_m: Range
-    """From the middle to the bank at each side."""
+    """Distance from the middle to the bank at each side."""
     behind_m: Positive
-    """Water behind the start."""
+    """Distance from the start to the bank behind it."""
     beyond_m: Positive
-    """Water beyond the goal."""
+    """Distance from the goal to the bank beyond it."""
     bank_radius_m: Positive
-    """Radius of the discs that make the banks."""
+    """Radius of the banks' discs."""
     first_wall_m: Positive
-    """Least place of a wall, ahead of the start."""
+    """Least distance of a wall ahead of the start."""
     start_clear_m: Positive
-    """Smallest distance of a wall from the start's box."""
+    """Least distance of a wall from the start's box."""
     goal_clear_m: Positive
-    """Smallest distance of a wall from the goal, between separate discs less."""
+    """Least distance of a wall from the goal, less for separate discs."""
     clearance_m: Positive
-    """What a way through the map keeps from all surfaces, at least."""
+    """Least clearance of a path through the map from all surfaces."""
     pocket: Pocket
     bar: Bar
     gate: Gate
@@ -77,15 +77,14 @@ class HardWaterNumbers(ReachNumbers):
     piles: Piles
 
     def _check(self) -> None:
-        if (far := self.length_m[0] - self.goal_clear_m) < self.first_wall_m:
+        if self.length_m[0] - self.goal_clear_m < self.first_wall_m:
             raise ValueError(
-                f"task.length_m must leave room for walls from task.first_wall_m = {self.first_wall_m:g} on to "
-                f"task.goal_clear_m = {self.goal_clear_m:g} before the goal, got {list(self.length_m)}, of which the "
-                f"shortest ends at {far:g}; raise it to at least {self.first_wall_m + self.goal_clear_m:g}"
+                f"task.length_m must be at least {self.first_wall_m + self.goal_clear_m:g}, task.first_wall_m and "
+                f"task.goal_clear_m, got {list(self.length_m)}; raise it"
             )
 
     def grid(self) -> MapGrid:
-        """Cells that hold the largest water."""
+        """Cells that cover the largest map."""
         rows = int((self.behind_m + self.length_m[1] + self.beyond_m) / CELL_M) + 1
         return MapGrid(-self.behind_m, -self.half_width_m[1], rows, int(2.0 * self.half_width_m[1] / CELL_M) + 1)
 
@@ -95,39 +94,40 @@ class Map(NamedTuple):
 
     kind: str
     length: float
-    """From the start to the goal [m]."""
+    """Distance from the start to the goal [m]."""
     discs: Float64
     """Walls and banks: x, y and radius [m], shape (disc, 3)."""
     tries: int
-    """How many were drawn until this one was accepted."""
+    """How many were sampled until this one was accepted."""
 
 
 class HardWaterMemory(NamedTuple):
-    """What ``hard_water`` remembers."""
+    """Memory of ``hard_water``."""
 
-    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
-    best_s: Annotated[Float64, "world vehicle", "Length of its free way at the start over full speed [s]."]
+    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle was first at the goal [s]; 0 before."]
+    best_s: Annotated[Float64, "world vehicle", "Length of its collision-free path at the start over full speed [s]."]
     turn: Annotated[Float64, "world 2", "Cosine and sine of the angle by which the map is turned."]
-    path_length: Annotated[Float64, "world row column", "Length of the free way to the goal from each cell [m]."]
-    path_cost: Annotated[
-        Float64, "world cost_row column", "Cost of the way on from each cell; no row without channel ``way``."
-    ]
+    path_length: Annotated[Float64, "world row column", "Length of the path to the goal from each cell [m]."]
+    path_cost: Annotated[Float64, "world cost_row column", "Cost of the path from each cell; empty without ``path``."]
     kind: Annotated[Float64, "world", "Index of the map's kind in ``KINDS``."]
 
 
 class HardWater(Reach):
-    """Come to a goal at rest through closed water whose walls are drawn by seed, and touch nothing.
+    """Reach a goal at rest through closed water with walls, sampled by seed, without a collision.
 
-    The goal's vector tells where it is, not which way leads there: that is for sonar, memory, and luck.
+    Vehicles perceive the vector to the goal, and must find the path by sonar and memory.
     """
 
     Numbers = HardWaterNumbers
     Memory: ClassVar[type[Any] | None] = HardWaterMemory
-    channels: ClassVar[Mapping[str, Table]] = {"path": PATH_FIELDS}
-    rewards: ClassVar[tuple[str, ...]] = ("dense", "geodesic")
+    channels: ClassVar[Mapping[str, FieldTable]] = {"path": PATH_FIELDS}
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        **Reach.rewards,
+        "geodesic": {**Reach.rewards["dense"], "progress": "as in dense; d: length of the collision-free path"},
+    }
     traffic: ClassVar[bool] = False  # a wall whose discs move has gaps, and a gate may close
     columns: ClassVar[Mapping[str, str]] = {
-        "time_ratio": "mean over vehicles there, of the time until then over the shortest free way at full speed [1]",
+        "time_ratio": "mean over vehicles that reached the goal: time over that of the shortest path at full speed [1]"
     }
 
     def __init__(self, swarm: Swarm) -> None:
@@ -137,20 +137,20 @@ class HardWater(Reach):
 
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:
-        """Room for the discs of a map, and for its cells."""
+        """The discs and the cells of a map."""
         grid = scenario.task_numbers.grid()
         cost_rows = grid.rows if "path" in scenario.sonar.channels else 0
         return {"point": 2, "obstacle": MOST_DISCS, "row": grid.rows, "column": grid.columns, "cost_row": cost_rows}
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
-        """Three times the longest straight way at full speed, and the queue."""
+        """Three times the longest straight path at full speed, and the queue."""
         numbers, n = scenario.task_numbers, scenario.swarm.num_vehicles
         longest = numbers.length_m[1] + scenario.start.sides(n)[0]
         return 3.0 * longest / top_speed(scenario.vehicle, scenario.actuators) + QUEUE_S * n
 
     def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
-        """A map that can be passed, turned at random; the start is the scenario's."""
+        """A map with a path, turned at random, and the scenario's start."""
         scenario, memory, sampled = self.swarm.scenario, self.memory, self.sample_map(rng)
         c, s = memory.turn[world] = cos_sin(rng.uniform(-np.pi, np.pi))
         discs, goal = sampled.discs.copy(), rotated(np.array([[0.0, 0.0], [sampled.length, 0.0]]), c, s)
@@ -172,10 +172,10 @@ class HardWater(Reach):
         )  # fmt: skip
 
     def sample_map(self, rng: np.random.Generator) -> Map:
-        """A map in its own frame that can be passed.
+        """A map in its own frame with a path to the goal.
 
         Raises:
-            ScenarioError: a thousand maps in a row can't be; the task's numbers leave no way.
+            ScenarioError: none of a thousand maps has one.
         """
         numbers = self.numbers
         for tries in range(1, MOST_TRIES + 1):
@@ -189,12 +189,12 @@ class HardWater(Reach):
             if len(sampled.discs) <= MOST_DISCS and self._passable(sampled, walls, own.blocks()):
                 return sampled
         raise ScenarioError(
-            f"task {self.swarm.scenario.task.name!r} drew {MOST_TRIES} maps of {', '.join(numbers.kinds)}, and none "
-            f"can be passed with task.clearance_m = {numbers.clearance_m:g}; widen the gaps, or lower the clearance"
+            f"task {self.swarm.scenario.task.name!r} sampled {MOST_TRIES} maps of {', '.join(numbers.kinds)}, none of "
+            f"them with a path at task.clearance_m = {numbers.clearance_m:g}; widen the gaps, or lower the clearance"
         )
 
     def _passable(self, sampled: Map, walls: Float64, blocks: bool) -> bool:
-        """Whether a way leads from all of the start's box to the goal, and, where it should, not straight ahead."""
+        """Whether the start's whole box has a path to the goal, and where walls should block, no straight one."""
         numbers, scenario = self.numbers, self.swarm.scenario
         if blocks and not (np.abs(walls[:, 1]) < walls[:, 2] + numbers.clearance_m).any():
             return False
@@ -207,7 +207,7 @@ class HardWater(Reach):
         return bool(reachable[top : bottom + 1, left : right + 1].all())
 
     def _path_lengths(self, world: Int64, place: Float64, goal: Float64) -> Float64:
-        """Length of the shortest free way [m] from places to a goal each, north and east, shape (place, 2).
+        """Length of the shortest path [m] from places to a goal each, north and east, shape (place, 2) both.
 
         ``world`` is the world of each place, shape (place,).
         """
@@ -221,11 +221,9 @@ class HardWater(Reach):
         return np.maximum(best, np.hypot(*(place - goal).T))
 
     def path_lengths(self, which: Bool | None = None) -> Float64:
-        """Length of the shortest free way of vehicles to their goals now [m].
+        """Length of the shortest collision-free path of vehicles to their goals [m].
 
-        Args:
-            which: of which vehicles, shape (world, vehicle); the result has shape (vehicle,). None for all, and then
-                the shape is (world, vehicle).
+        With ``which``, shape (world, vehicle), only of these vehicles, shape (vehicle,); else shape (world, vehicle).
         """
         eta, goals = self.swarm.state.eta, self.swarm.world_map.waypoints[:, 0, 1]
         chosen = np.ones(eta.shape[:2], np.bool_) if which is None else which
@@ -234,7 +232,7 @@ class HardWater(Reach):
         return lengths.reshape(eta.shape[:2]) if which is None else lengths
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
-        """The rows of ``way``, where it is granted."""
+        """The fields of the channel ``path``."""
         swarm, memory = self.swarm, self.memory
         if not memory.path_cost.size:
             return {}
@@ -244,28 +242,27 @@ class HardWater(Reach):
         return {"path": path, "path_length": self.path_lengths()[:, :, None], "path_walls": walls}
 
     def move(self, running: Bool) -> None:  # noqa: ARG002
-        """Before a step that pays for the way: how long it is."""
+        """Note the lengths of paths, from which the reward ``geodesic`` takes progress."""
         if self.reward_name == "geodesic":
             self._remaining_before_m = self.path_lengths()
 
     def path_length_m(self) -> Float64:
-        """The free way."""
+        """Length of the collision-free path [m], shape (world, vehicle)."""
         return self.path_lengths()
 
     def remaining_m(self) -> tuple[Float64, Float64]:
-        """With the reward ``geodesic``, which knows the map, the free way; else the distance."""
-        return (
-            (self.path_lengths(), self._remaining_before_m) if self.reward_name == "geodesic" else super().remaining_m()
-        )
+        """With the reward ``geodesic`` the path's length, else the distance."""
+        geodesic = self.reward_name == "geodesic"
+        return (self.path_lengths(), self._remaining_before_m) if geodesic else super().remaining_m()
 
     def at_goal(self) -> Bool:
-        """Vehicles within ``near_m`` of the goal, along the free way."""
+        """Vehicles within ``near_m`` of the goal, along the collision-free path."""
         near = self.swarm.facts.away <= self.numbers.near_m
         near[near] = self.path_lengths(near) <= self.numbers.near_m
         return near
 
     def metrics(self, world: int) -> dict[str, float | None]:
-        """Also how long vehicles took, and the map's kind by its place in ``KINDS``."""
+        """Also the time ratio, and the index of the map's kind in ``KINDS``."""
         memory = self.memory
         took = memory.first_at_goal_s[world] > 0.0
         ratio = float((memory.first_at_goal_s[world] / memory.best_s[world])[took].mean()) if took.any() else None

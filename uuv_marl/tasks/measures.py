@@ -1,4 +1,4 @@
-"""What is measured of every run, whatever its task: the names that a task's own measures can't have."""
+"""Metrics of every run, of any task: names that a task's own metrics can't have."""
 
 from typing_extensions import TypedDict
 
@@ -13,7 +13,7 @@ class Shares(TypedDict):
 
 
 class Measures(TypedDict):
-    """Measures of the swarm as a whole; None if there was nothing to measure.
+    """Metrics of the swarm; None if there was nothing to measure.
 
     Distances are in m and taken from the start to the episode's end; times are in s.
     """

@@ -1,4 +1,4 @@
-"""``reach``: every vehicle goes to a goal at rest, the end of its trajectory, and touches nothing on the way."""
+"""``reach``: every vehicle goes to a goal at rest, the end of its trajectory, without a collision."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -8,7 +8,8 @@ import numpy as np
 from uuv_marl.scenario.fields import Positive, Section
 from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.tasks.task import Task, Terms
+from uuv_marl.tasks.reward import Terms
+from uuv_marl.tasks.task import Task
 from uuv_marl.types import Bool, Float64
 
 
@@ -16,26 +17,26 @@ class ReachNumbers(Section):
     """Numbers of ``reach``."""
 
     near_m: Positive = 60.0
-    """A vehicle is there within this distance of its goal. Assumed: about the radius of 54 vehicles at rest."""
+    """A vehicle is at its goal within this distance. Assumed: about the radius of 54 vehicles at rest."""
 
 
 class ReachMemory(NamedTuple):
-    """What ``reach`` remembers."""
+    """Memory of ``reach``."""
 
-    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
+    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle was first at its goal [s]; 0 before."]
 
 
 class Reach(Task):
     """Be within ``near_m`` of a goal at rest; the episode ends when all living vehicles are.
 
-    The weights are those of ``follow``. Laws: progress sums to what the way has shortened by; no step pays more than
-    that, but for the arrival, which pays once; nothing depends on the number of vehicles.
+    The weights are those of ``follow``. Progress sums to the reduction of the distance; beside it only the arrival is
+    rewarded, once; no term depends on the number of vehicles.
     """
 
     Numbers = ReachNumbers
     Memory: ClassVar[type[Any] | None] = ReachMemory
     reference_label: ClassVar[str] = "goal"
-    terms: ClassVar[Mapping[str, str]] = {
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
         "obstacle": "-w · dt · clip(1 - d/s_o, 0, 1); d: distance to the nearest obstacle's surface",
         "spacing": "-w · dt · clip(1 - d/s_u, 0, 1); d: distance to the nearest vehicle",
         "effort": "-w · dt · a²; a²: mean squared length of the action, 1 at full force",
@@ -45,19 +46,19 @@ class Reach(Task):
         "arrival": "+w once, when the vehicle is first within near_m of its goal",
         "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the goal, D: progress_far_m, "
         "c: progress_m",
-    }
+    }}  # fmt: skip
 
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
         self._weight, self._limits = swarm.scenario.reward, swarm.scenario.constraints
 
     def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
-        """As the scenario says, but l(t) rests at the end all along."""
+        """The scenario's own, but l(t) rests at its end from the start."""
         drawn = super().draw(world, rng)
         return drawn._replace(times=tuple(np.zeros_like(times) for times in drawn.times))
 
     def update(self, running: Bool) -> None:
-        """When vehicles are there first."""
+        """Note when vehicles are first at their goals."""
         first = running[:, None] & self.at_goal() & self.swarm.state.alive & (self.memory.first_at_goal_s == 0.0)
         self.memory.first_at_goal_s[first] = np.broadcast_to(self.swarm.facts.time_s[:, None], first.shape)[first]
 
@@ -80,15 +81,15 @@ class Reach(Task):
         }
 
     def remaining_m(self) -> tuple[Float64, Float64]:
-        """What progress counts: how far vehicles are from their goals, and were before the step [m]."""
+        """Distance to the goal that progress uses, now and before the step [m], shape (world, vehicle)."""
         return self.swarm.facts.away, self.swarm.facts.away_before
 
     def arrived_before(self) -> Bool:
-        """Vehicles that have been there."""
+        """Vehicles that have been at their goals."""
         return self.memory.first_at_goal_s > 0.0
 
     def done(self) -> Bool:
-        """Worlds in which all living vehicles are there."""
+        """Worlds in which all living vehicles are at their goals."""
         alive = self.swarm.state.alive
         return np.logical_and((self.at_goal() | ~alive).all(axis=1), alive.any(axis=1))
 

@@ -1,4 +1,4 @@
-"""``silent_targets``: targets move in a box and make no sound; who finds one by its echo is to keep near it."""
+"""``silent_targets``: find silent targets that move in a box by their echoes, and stay near them."""
 
 import math
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.percept import DIRECTION, PerceptField, Table
+from uuv_marl.percept import DIRECTION, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Positive, Section, within
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -19,41 +19,39 @@ from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.maps.guidance import NUM_WALLS, PATH_FIELDS, write_walls
-from uuv_marl.tasks.maps.walls import Range, between
+from uuv_marl.tasks.maps.walls import Range, Span, between
 from uuv_marl.tasks.reach import Reach
-from uuv_marl.tasks.task import Task, Terms
+from uuv_marl.tasks.reward import Terms
 from uuv_marl.types import Bool, Float64, Int64
 
 LEAD_S = 2.0
-"""The channel ``way`` leads to where a target is in so long [s]. Assumed: as piloted with ``oracle``."""
+"""The channel ``path`` leads to a target's position so much later [s]. Assumed, tried by hand with ``oracle``."""
 
 
 class SilentTargetsNumbers(Section):
     """Numbers of ``silent_targets``; the scenario's file has their sources."""
 
     targets: Annotated[int, within(1, 1024)]
-    """How many there are."""
+    """Number of targets."""
     side_m: Positive
     """Side of the square box in which they stay."""
     speed_share: Range
-    """Their speed, as a share of a vehicle's at full force; each draws its own."""
-    turn_s: tuple[Positive, Positive]
-    """Shortest and longest time between two of a target's turns, each by any angle."""
+    """Speed of a target, as a share of a vehicle's at full force."""
+    turn_s: Span
+    """Time between two of a target's turns, each by any angle."""
     turn_dps: Positive
-    """How fast they turn [deg/s]."""
+    """Rate of their turns [deg/s]."""
     held_m: Positive
-    """A target is held while a vehicle is so near."""
+    """A target is held while a vehicle is within this distance."""
     clear_m: Positive
-    """No target starts nearer to the middle of the box, where the vehicles start."""
+    """Least distance of a target's start from the middle of the box, where the vehicles start."""
 
     def _check(self) -> None:
         if self.speed_share[1] > 1.0:
             raise ValueError(
-                "task.speed_share must be at most 1, the vehicles' full speed, or nobody holds a target, got "
+                "task.speed_share must be at most 1, the vehicles' full speed, so that a target can be held, got "
                 f"{list(self.speed_share)}; lower it"
             )
-        if self.turn_s[0] > self.turn_s[1]:
-            raise ValueError(f"task.turn_s must be [low, high] with low <= high, got {list(self.turn_s)}")
         if self.clear_m > 0.5 * self.side_m:
             raise ValueError(
                 f"task.clear_m must be at most half of task.side_m = {self.side_m:g}, got {self.clear_m:g}; "
@@ -62,20 +60,20 @@ class SilentTargetsNumbers(Section):
 
 
 class SilentTargetsMemory(NamedTuple):
-    """What ``silent_targets`` remembers."""
+    """Memory of ``silent_targets``."""
 
-    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle held a target first [s]; 0 before."]
+    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle first held a target [s]; 0 before."]
     remaining_m: Annotated[
         Float64, "world vehicle", "Distance to the nearest target that no nearer vehicle holds, or 0 [m]."
     ]
     remaining_before_m: Annotated[Float64, "world vehicle", "The same before the step."]
     speed: Annotated[Float64, "world target", "Speed of the target [m/s]."]
-    heading: Annotated[Float64, "world target", "Where it goes, clockwise from north [rad]."]
-    to_turn: Annotated[Float64, "world target", "How far it is yet to turn, clockwise [rad]."]
-    turn_at: Annotated[Float64, "world target turn", "When it begins to turn [s]."]
-    turn_by: Annotated[Float64, "world target turn", "By which angle [rad]."]
+    heading: Annotated[Float64, "world target", "Its direction, clockwise from north [rad]."]
+    to_turn: Annotated[Float64, "world target", "Remaining angle of its turn, clockwise [rad]."]
+    turn_at: Annotated[Float64, "world target turn", "Start of the turn [s]."]
+    turn_by: Annotated[Float64, "world target turn", "Angle of the turn [rad]."]
     turns: Annotated[Int64, "world target", "Turns that it has begun."]
-    found_s: Annotated[Float64, "world target", "When the target was held first [s]; infinite before."]
+    found_s: Annotated[Float64, "world target", "When the target was first held [s]; infinite before."]
     held: Annotated[Float64, "world target", "Decisions of the last half at which it was held."]
     judged: Annotated[Float64, "world", "Decisions of the last half."]
 
@@ -85,67 +83,61 @@ def walk(
     worlds: Bool, time_s: Float64, period: float, half: float, rate: float, places: Float64, memory: SilentTargetsMemory,
     velocity: Float64,
 ) -> None:  # fmt: skip
-    """Fill the targets' velocities for the coming step; who would leave the box is mirrored at its side.
+    """Fill the targets' velocities for the coming step; one that would leave the box is reflected at its edge.
 
     Args:
-        worlds: those that are about to step, shape (world,).
+        worlds: worlds that are stepped, shape (world,).
         time_s: since the reset, shape (world,).
-        period: time of a step [s].
+        period: duration of a step [s].
         half: half of the box's side [m].
-        rate: how fast targets turn [rad/s].
-        places: north and east, shape (world, target, at least 2).
-        kept: the task's memory, which is changed.
-        velocity: north and east, shape (world, target, 2).
+        rate: turn rate [rad/s].
+        places: north and east [m], shape (world, target, at least 2).
+        memory: the task's memory, which is changed.
+        velocity: north and east [m/s], shape (world, target, 2).
     """
     for w in range(memory.speed.shape[0]):
         for k in range(memory.speed.shape[1] if worlds[w] else 0):
-            while (
-                memory.turns[w, k] < memory.turn_at.shape[2] and memory.turn_at[w, k, memory.turns[w, k]] <= time_s[w]
-            ):
-                memory.to_turn[w, k] = memory.turn_by[w, k, memory.turns[w, k]]
-                memory.turns[w, k] += 1
+            begun = memory.turns[w, k]
+            while begun < memory.turn_at.shape[2] and memory.turn_at[w, k, begun] <= time_s[w]:
+                memory.to_turn[w, k] = memory.turn_by[w, k, begun]
+                begun += 1
+            memory.turns[w, k] = begun
             turn = min(max(memory.to_turn[w, k], -rate * period), rate * period)
             memory.to_turn[w, k] -= turn
             memory.heading[w, k] += turn
             c, s = cos_sin(memory.heading[w, k])
             distance = memory.speed[w, k] * period
             if abs(places[w, k, 0] + distance * c) > half:
-                c, memory.heading[w, k], memory.to_turn[w, k] = (
-                    -c,
-                    math.pi - memory.heading[w, k],
-                    -memory.to_turn[w, k],
-                )
+                c, memory.heading[w, k] = -c, math.pi - memory.heading[w, k]
+                memory.to_turn[w, k] = -memory.to_turn[w, k]
             if abs(places[w, k, 1] + distance * s) > half:
                 s, memory.heading[w, k], memory.to_turn[w, k] = -s, -memory.heading[w, k], -memory.to_turn[w, k]
             velocity[w, k, 0], velocity[w, k, 1] = memory.speed[w, k] * c, memory.speed[w, k] * s
 
 
 class SilentTargets(Reach):
-    """Find targets that move in a box and make no sound, only echoes, and keep within ``held_m`` of them.
+    """Find targets that move in a box and return only echoes, and stay within ``held_m`` of them.
 
-    All obstacles are targets, as large as a vehicle's hull, so that every echo is one's. The reference is the middle of
-    the box, at rest.
-    The headline is ``held_share``; a vehicle succeeds that touches nothing.
+    All obstacles are targets, as large as a vehicle's hull, so that every echo is a target's. The reference is the
+    middle of the box, at rest. A vehicle succeeds if it stays collision-free.
     """
 
     Numbers = SilentTargetsNumbers
     Memory: ClassVar[type[Any] | None] = SilentTargetsMemory
-    observed: ClassVar[Table] = (
-        PerceptField(
-            "box", (2,), DIRECTION, "cosine and sine of the heading by compass from the first axis of the targets' box"
-        ),
+    observed: ClassVar[FieldTable] = (
+        PerceptField("box", (2,), DIRECTION, "cosine and sine of the compass heading from the box's first axis"),
     )
-    channels: ClassVar[Mapping[str, Table]] = {"path": PATH_FIELDS}
-    terms: ClassVar[Mapping[str, str]] = {
-        **{name: meaning for name, meaning in Reach.terms.items() if name != "arrival"},
-        "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no vehicle "
-        "nearer to it holds, 0 if there is none, D: progress_far_m, c: progress_m",
+    channels: ClassVar[Mapping[str, FieldTable]] = {"path": PATH_FIELDS}
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
+        **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "arrival"},
+        "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no "
+        "nearer vehicle holds, 0 if there is none, D: progress_far_m, c: progress_m",
         "held": "+w_arrival · dt/T for each target that is held, to the vehicle nearest to it; T: the time limit",
-    }
+    }}  # fmt: skip
     traffic: ClassVar[bool] = False
     has_goal: ClassVar[bool] = False
     reference_label: ClassVar[str] = "middle of the box"
-    mark_label: ClassVar[str] = "where a target is held"
+    mark_label: ClassVar[str] = "target is held within"
     headline: ClassVar[str] = "held_share"
     columns: ClassVar[Mapping[str, str]] = {
         "held_share": "share of the last half of the episode in which targets are held, mean over targets [1]",
@@ -165,18 +157,18 @@ class SilentTargets(Reach):
 
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:
-        """An obstacle per target, and room for all turns of an episode."""
+        """An obstacle per target, and all turns of an episode."""
         numbers, limit = scenario.task_numbers, scenario.time_limit.of(cls.longest_s(scenario))
         turns = math.ceil(limit / numbers.turn_s[0])
         return {"point": 2, "obstacle": numbers.targets, "target": numbers.targets, "turn": turns}
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
-        """The way along the box's side at full speed."""
+        """The time along the box's side at full speed."""
         return scenario.task_numbers.side_m / top_speed(scenario.vehicle, scenario.actuators)
 
     def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
-        """The scenario's start in the middle of the box, and targets anywhere but there, with all their turns."""
+        """The scenario's start in the middle of the box, targets around it, and all their turns."""
         numbers, scenario, memory = self.numbers, self.swarm.scenario, self.memory
         length, _ = scenario.start.sides(self.swarm.num_vehicles)
         eta, nu = start_state(scenario, np.array([[0.5 * length, 0.0], [length, 0.0]]), rng)
@@ -196,7 +188,7 @@ class SilentTargets(Reach):
         )  # fmt: skip
 
     def _place(self, rng: np.random.Generator) -> Float64:
-        """Where a target starts."""
+        """A target's start."""
         half, clear = 0.5 * self.numbers.side_m, self.numbers.clear_m
         while True:
             place = rng.uniform(-half, half, 2)
@@ -204,11 +196,11 @@ class SilentTargets(Reach):
                 return place
 
     def begin(self, world: int) -> None:
-        """How far targets are."""
+        """Note the distances to targets."""
         self.memory.remaining_m[world] = self._remaining_m()[world]
 
     def move(self, running: Bool) -> None:
-        """Before a step: where targets go."""
+        """Set the targets' velocities."""
         numbers, world_map = self.numbers, self.swarm.world_map
         walk(
             running, self.swarm.facts.time_s, self.swarm.scenario.timing.decision_period_s, 0.5 * numbers.side_m,
@@ -216,7 +208,7 @@ class SilentTargets(Reach):
         )  # fmt: skip
 
     def away(self) -> Float64:
-        """Distance of every vehicle from every target [m], infinite for the lost; shape (world, vehicle, target)."""
+        """Distance of every vehicle from every target [m], infinite if lost; shape (world, vehicle, target)."""
         state, targets = self.swarm.state, self.swarm.world_map.obstacles
         x, y = np.moveaxis(targets[:, None, :, :2] - state.eta[:, :, None, :2], -1, 0)
         return np.where(state.alive[:, :, None], np.sqrt(x * x + y * y), math.inf)
@@ -241,7 +233,7 @@ class SilentTargets(Reach):
         return self.away().min(axis=2) <= self.numbers.held_m
 
     def update(self, running: Bool) -> None:
-        """Which targets are held, and how far the others are."""
+        """Note which targets are held, and the distances to the others."""
         super().update(running)
         memory, time_s, held = self.memory, self.swarm.facts.time_s, self.held()
         late = running & (time_s > 0.5 * self.swarm.time_limit_s)
@@ -249,20 +241,17 @@ class SilentTargets(Reach):
         memory.judged[late] += 1.0
         found = running[:, None] & held
         memory.found_s[found] = np.minimum(memory.found_s, time_s[:, None])[found]
-        memory.remaining_before_m[running], memory.remaining_m[running] = (
-            memory.remaining_m[running],
-            self._remaining_m()[running],
-        )
+        memory.remaining_before_m[running] = memory.remaining_m[running]
+        memory.remaining_m[running] = self._remaining_m()[running]
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
-        """The heading in the box, and where it is granted the way to one's own target."""
-        swarm = self.swarm
-        fields = {"box": swarm.compass}
-        return fields | self._path_fields() if "path" in swarm.scenario.sonar.channels else fields
+        """The heading in the box, and with the channel ``path`` the path to the vehicle's own target.
 
-    def _path_fields(self) -> dict[str, Float64]:
-        """The rows of ``way``: to where one's own target is soon, of an assignment with the shortest ways in all."""
-        swarm = self.swarm
+        Targets are assigned so that the sum of all paths is smallest; a path leads to the target's position soon.
+        """
+        swarm, fields = self.swarm, {"box": self.swarm.compass}
+        if "path" not in swarm.scenario.sonar.channels:
+            return fields
         world_map, away = swarm.world_map, self.away()
         path, walls = np.zeros((*away.shape[:2], 2)), np.zeros((*away.shape[:2], NUM_WALLS, 2))
         soon = world_map.obstacles[:, :, :2] + LEAD_S * world_map.obstacle_velocity
@@ -271,14 +260,17 @@ class SilentTargets(Reach):
             path[w, vehicle] = soon[w, target] - swarm.state.eta[w, vehicle, :2]
         (x, y), (c, s) = np.moveaxis(path, -1, 0), np.moveaxis(swarm.heading, -1, 0)
         write_walls(swarm.state, world_map, swarm.heading, walls)
-        return {
+        return fields | {
             "path": np.stack([c * x + s * y, c * y - s * x], axis=-1),
             "path_length": np.sqrt(x * x + y * y)[:, :, None],
             "path_walls": walls,
         }
 
     def reward(self, running: Bool) -> Terms:
-        """For holding, not for arriving: paid once, who does not remember it leaves."""
+        """Progress and costs of ``reach``, and the term ``held`` in place of ``arrival``.
+
+        A policy without memory would leave after a reward that is given once.
+        """
         share = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s
         away, nearest = self._nearest()
         num_held = ((away == nearest) & (nearest <= self.numbers.held_m)).sum(axis=2)
@@ -286,27 +278,27 @@ class SilentTargets(Reach):
         return {**usual, "held": self._weight.arrival * share[:, None] * num_held}
 
     def remaining_m(self) -> tuple[Float64, Float64]:
-        """How far vehicles are from the nearest target that no nearer one holds, and were before the step [m]."""
+        """Distance to the nearest target that no nearer vehicle holds, now and before the step [m]."""
         return self.memory.remaining_m, self.memory.remaining_before_m
 
     def done(self) -> Bool:
         """No world: the time limit ends the episode."""
-        return Task.done(self)
+        return np.zeros(self.swarm.num_worlds, np.bool_)
 
     def succeeded(self) -> Bool:
-        """Vehicles that live and have touched nothing."""
+        """Vehicles that are alive and collision-free."""
         return self.swarm.state.alive & ~self.swarm.state.collided
 
     def success(self, world: int, vehicle: int | None = None) -> bool:
-        """Of a vehicle, whether it has touched nothing; of all, whether all targets were held all of the last half."""
+        """Whether a vehicle is collision-free; with None, whether every target was held for all of the last half."""
         return self.held_share(world) == 1.0 if vehicle is None else super().success(world, vehicle)
 
     def held_share(self, world: int) -> float:
-        """Share of the last half so far in which targets were held; 0 before it."""
+        """Share of the last half so far in which targets were held; 0 before."""
         return float(self.memory.held[world].mean() / max(self.memory.judged[world], 1.0))
 
     def metrics(self, world: int) -> dict[str, float | None]:
-        """Also the headline; ``whole`` is 1 if all targets were held all of the last half."""
+        """Also the columns; ``swarm_success`` is 1 if every target was held for all of the last half."""
         found, share = self.memory.found_s[world], self.held_share(world)
         return {
             **super().metrics(world), "swarm_success": float(share == 1.0), "held_share": share,

@@ -1,4 +1,4 @@
-"""``two_swarms``: two groups swap sides through the one gap of a wall, which is drawn by the seed."""
+"""``two_swarms``: two groups swap sides through the single gap of a wall, sampled by seed."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.percept import FLAG, PerceptField, Table
+from uuv_marl.percept import FLAG, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import NonNegative, Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -19,22 +19,24 @@ from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.maps.guidance import AHEAD_M, NUM_WALLS, PATH_FIELDS, write_walls
 from uuv_marl.tasks.maps.walls import INTO_BANK_M, Range, banks, between, joined, wall
 from uuv_marl.tasks.reach import Reach, ReachNumbers
-from uuv_marl.tasks.task import Terms
+from uuv_marl.tasks.reward import Terms
 from uuv_marl.types import Bool, Float64, Int64
 
 _BEFORE_M = 5.0
-"""How far from the wall's surface a way turns to the gap [m]."""
-_TURN = PerceptField("right_of_way", (1,), FLAG, "1 if those of the other group that go first are through, else 0")
+"""Distance from the wall's surface at which a path turns to the gap [m]."""
+_TURN = PerceptField(
+    "right_of_way", (1,), FLAG, "1 if the group that goes first has passed, or for its vehicles; else 0"
+)
 
 
 def in_axes(vectors: Float64, axes: Float64) -> Float64:
-    """Vectors in axes that are turned by angles of which the cosine and sine are given, shape (..., 2) both."""
+    """Vectors in axes that are turned by angles, given as cosine and sine, shape (..., 2) both."""
     (x, y), (c, s) = np.moveaxis(vectors, -1, 0), np.moveaxis(axes, -1, 0)
     return np.stack([c * x + s * y, c * y - s * x], axis=-1)
 
 
 def _through(place: Float64, goal: Float64, at: Float64 | float) -> Float64:
-    """Length of the straight ways to the gap and on [m]; all in the map's own frame, places and goals (..., 2)."""
+    """Length of the path through the gap [m] in the map's frame; places and goals (..., 2)."""
     return sum((np.hypot(end[..., 0], end[..., 1] - at) for end in (place, goal)), np.zeros(place.shape[:-1]))
 
 
@@ -42,21 +44,21 @@ class TwoSwarmsNumbers(ReachNumbers):
     """Numbers of ``two_swarms``; the scenario's file has their sources."""
 
     apart_m: Positive
-    """From the middle of each group to the wall, before it is moved aside."""
+    """Distance from the middle of each group to the wall."""
     aside_m: NonNegative
-    """How far each group is moved along the wall, at most."""
+    """Largest offset of each group along the wall."""
     gap_m: Range
     """Width of the gap."""
     gap_aside_m: NonNegative
-    """How far the gap is from the middle of the wall, at most."""
+    """Largest offset of the gap from the middle of the wall."""
     radius_m: Positive
-    """Radius of the discs that the wall is made of."""
+    """Radius of the wall's discs."""
     half_width_m: Positive
-    """From the middle to the bank at each side."""
+    """Distance from the middle to the bank at each side."""
     behind_m: Positive
-    """Water behind the middle of each group."""
+    """Distance from the middle of each group to the bank behind it."""
     bank_radius_m: Positive
-    """Radius of the discs that make the banks."""
+    """Radius of the banks' discs."""
 
     def _check(self) -> None:
         if (least := self.gap_aside_m + self.gap_m[1] / 2 + self.radius_m) > self.half_width_m:
@@ -66,11 +68,11 @@ class TwoSwarmsNumbers(ReachNumbers):
             )
 
     def check_space(self, hull_radius: float, length: float) -> None:
-        """Raise ScenarioError where hulls of this radius don't fit through, or groups so long start in the wall."""
+        """Raise ScenarioError if hulls of this radius don't fit through, or groups of this length start in the wall."""
         if self.gap_m[0] <= 2.0 * hull_radius:
             raise ScenarioError(
-                f"task.gap_m must be above {2.0 * hull_radius:g}, two times collision.hull_radius_m, got {list(self.gap_m)}; "
-                "widen it"
+                f"task.gap_m must be above {2.0 * hull_radius:g}, twice collision.hull_radius_m, got "
+                f"{list(self.gap_m)}; widen it"
             )
         if self.apart_m < (least := 0.5 * length + self.radius_m + hull_radius):
             raise ScenarioError(
@@ -79,7 +81,7 @@ class TwoSwarmsNumbers(ReachNumbers):
             )
 
     def discs(self, gap: float, at: float) -> Float64:
-        """Wall and banks around the wall's middle, x ahead, y along the wall and radius [m], shape (disc, 3)."""
+        """Wall and banks around the wall's middle: x ahead, y along the wall and radius [m], shape (disc, 3)."""
         end, beyond, radius = self.half_width_m + INTO_BANK_M, self.apart_m + self.behind_m, self.radius_m
         left, right = at - gap / 2 - radius, at + gap / 2 + radius
         sides = (wall((0.0, left), (0.0, -end), radius), wall((0.0, right), (0.0, end), radius))
@@ -87,36 +89,36 @@ class TwoSwarmsNumbers(ReachNumbers):
 
 
 class TwoSwarmsMemory(NamedTuple):
-    """What ``two_swarms`` remembers."""
+    """Memory of ``two_swarms``."""
 
-    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle was there first [s]; 0 before."]
-    best_s: Annotated[Float64, "world vehicle", "Its straight way through the gap's middle over full speed [s]."]
-    side: Annotated[Float64, "world vehicle", "1 for who goes along the frame's x, -1 for who comes against it."]
+    first_at_goal_s: Annotated[Float64, "world vehicle", "When the vehicle was first at its goal [s]; 0 before."]
+    best_s: Annotated[Float64, "world vehicle", "Its path through the gap's middle over full speed [s]."]
+    side: Annotated[Float64, "world vehicle", "1 for vehicles that go along the frame's x, -1 for the others."]
     turn: Annotated[Float64, "world 2", "Cosine and sine of the angle by which the map is turned."]
-    gap: Annotated[Float64, "world", "Where along the wall the gap's middle is [m]."]
+    gap: Annotated[Float64, "world", "Position of the gap's middle along the wall [m]."]
 
 
 class TwoSwarms(Reach):
-    """Two groups swap sides through the one gap of a wall; each vehicle has its own goal, and touches nothing.
+    """Two groups swap sides through the single gap of a wall, each vehicle to its own goal, without a collision.
 
-    A group per vehicle holds its goal: its place at the start, moved across the wall.
+    Every vehicle has a group of its own for its goal: its start, moved across the wall.
     """
 
     Numbers = TwoSwarmsNumbers
     Memory: ClassVar[type[Any] | None] = TwoSwarmsMemory
-    channels: ClassVar[Mapping[str, Table]] = {"path": (*PATH_FIELDS, _TURN)}
-    terms: ClassVar[Mapping[str, str]] = {
-        **{name: meaning for name, meaning in Reach.terms.items() if name != "arrival"},
+    channels: ClassVar[Mapping[str, FieldTable]] = {"path": (*PATH_FIELDS, _TURN)}
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
+        **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "arrival"},
         "stay": "+w_arrival · dt/T while the vehicle is within near_m of its goal, and when all are, for the time that "
         "is left until the limit T",
-    }
+    }}  # fmt: skip
     columns: ClassVar[Mapping[str, str]] = {
-        "time_ratio": "mean over vehicles there, of the time until then over the straight way at full speed [1]",
-        "swarm_time_ratio": "the same of the last vehicle, if all came there [1]",
+        "time_ratio": "mean over vehicles that reached their goals: time over that of the path at full speed [1]",
+        "swarm_time_ratio": "the same of the last vehicle, if all reached their goals [1]",
     }
     traffic: ClassVar[bool] = False
     reference_label: ClassVar[str] = "goal of a vehicle"
-    mark_label: ClassVar[str] = "where a vehicle is there"
+    mark_label: ClassVar[str] = "a vehicle is at its goal"
     reference_policy: ClassVar[str] = "tangent_bug"
 
     def __init__(self, swarm: Swarm) -> None:
@@ -125,24 +127,24 @@ class TwoSwarms(Reach):
         numbers.check_space(swarm.scenario.collision.hull_radius_m, length)
         if length / 2 > numbers.behind_m or width / 2 + numbers.aside_m > numbers.half_width_m:
             raise ScenarioError(
-                f"the groups must start in the water of task 'two_swarms': {length:g} x {width:g} m each, moved by "
+                f"the groups must start within the banks of task 'two_swarms': {length:g} x {width:g} m each, moved by "
                 f"task.aside_m = {numbers.aside_m:g}; raise task.half_width_m and task.behind_m, or shrink start"
             )
 
     @classmethod
     def sizes(cls, scenario: Scenario) -> Mapping[str, int]:
-        """A group per vehicle, and room for the discs of a map."""
+        """A group per vehicle, and the discs of a map."""
         numbers = scenario.task_numbers
         most = len(numbers.discs(numbers.gap_m[0], 0.0)) + 2
         return {"group": scenario.swarm.num_vehicles, "point": 2, "obstacle": most}
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
-        """The way between both groups' middles at full speed, for all maps."""
+        """The time between the groups' middles at full speed, for all maps."""
         return 2.0 * scenario.task_numbers.apart_m / top_speed(scenario.vehicle, scenario.actuators)
 
     def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
-        """A wall with a gap, a group of the scenario's start on each side, all of it turned at random."""
+        """A wall with a gap and a group of the scenario's start on each side, turned at random."""
         numbers, scenario, memory = self.numbers, self.swarm.scenario, self.memory
         gap, at = between(rng, numbers.gap_m), numbers.gap_aside_m * rng.uniform(-1.0, 1.0)
         c, s = cos_sin(rng.uniform(-math.pi, math.pi))
@@ -158,9 +160,9 @@ class TwoSwarms(Reach):
         )  # fmt: skip
 
     def _start(self, rng: np.random.Generator, side: Float64) -> tuple[Float64, Float64, Float64]:
-        """Places in the map's own frame [m], shape (vehicle, 2), poses and velocities; ``side`` is filled.
+        """Positions in the map's own frame [m], shape (vehicle, 2), poses and velocities; ``side`` is filled.
 
-        The scenario's start has both groups side by side: the one to starboard is taken to the other side of the wall.
+        In the scenario's start both groups are side by side; the one to starboard is moved across the wall.
         """
         numbers, scenario = self.numbers, self.swarm.scenario
         eta, nu = start_state(scenario, np.array([[0.0, 0.0], [1.0, 0.0]]), rng)
@@ -171,7 +173,7 @@ class TwoSwarms(Reach):
         return np.stack([along, eta[:, 1] + side * (scenario.start.gap_m + width) / 2 + aside], axis=1), eta, nu
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
-        """The rows of ``way``, where it is granted: through the gap's middle, the port group first."""
+        """The fields of the channel ``path``: through the gap's middle, the port group first."""
         swarm, side = self.swarm, self.memory.side
         if "path" not in swarm.scenario.sonar.channels:
             return {}
@@ -191,7 +193,10 @@ class TwoSwarms(Reach):
         }
 
     def reward(self, running: Bool) -> Terms:
-        """For staying, not for arriving: paid once, who does not remember it leaves, and loses hardly any progress."""
+        """Progress and costs of ``reach``, and the term ``stay`` in place of ``arrival``.
+
+        A policy without memory would leave after a reward that is given once.
+        """
         swarm, period = self.swarm, self.swarm.scenario.timing.decision_period_s
         left_s = swarm.time_limit_s - swarm.facts.time_s
         share = np.where(self.done(), left_s + period, period) / swarm.time_limit_s
@@ -199,7 +204,7 @@ class TwoSwarms(Reach):
         return {**usual, "stay": self._weight.arrival * share[:, None] * self.at_goal()}
 
     def metrics(self, world: int) -> dict[str, float | None]:
-        """Also how long vehicles took, and the last of them."""
+        """Also the columns."""
         took, best = self.memory.first_at_goal_s[world], self.memory.best_s[world]
         arrived = took > 0.0
         ratio = float((took / best)[arrived].mean()) if arrived.any() else None
@@ -209,7 +214,7 @@ class TwoSwarms(Reach):
         }  # fmt: skip
 
     def teams(self, world: int) -> Int64:
-        """The two groups, though each vehicle has its own goal."""
+        """The two groups."""
         return (self.memory.side[world] < 0.0).astype(np.int64)
 
     def marks(self, world: int) -> NDArray[np.floating[Any]]:

@@ -33,8 +33,10 @@ def _reward(name: str | None, scenario: Scenario) -> tuple[str, str]:
     if name is not None and ":" in name:
         return name, ""
     task, weights = scenario.task_class, scenario.reward.model_dump()
-    terms = [f"\n  {term}: {_with_numbers(term, formula, weights)}" for term, formula in task.terms.items()]
-    return f"{name or task.rewards[0]} of task {scenario.task.name}", "".join(terms) or ": none"
+    first = next(iter(task.rewards))
+    formulas = task.rewards.get(name or first, task.rewards[first])
+    terms = [f"\n  {term}: {_with_numbers(term, formula, weights)}" for term, formula in formulas.items()]
+    return f"{name or first} of task {scenario.task.name}", "".join(terms) or ": none"
 
 
 def _with_numbers(term: str, formula: str, weights: Mapping[str, float]) -> str:

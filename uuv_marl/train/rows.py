@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.learned.actor import bound, in_disc
 from uuv_marl.baselines.learned.checkpoint import Card
-from uuv_marl.baselines.making import compose, make
+from uuv_marl.baselines.making import compose, make_policy
 from uuv_marl.baselines.policy import Policy, part_of, parts_of
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import PolicyError, TrainingError
@@ -42,7 +42,7 @@ class ExternalActionPolicy(Policy):
     """A policy whose actions are set from outside, in place of the network."""
 
     def __init__(self, scenario: Scenario, num_worlds: int, card: Card) -> None:
-        self.copy_requirements(card)
+        self.requirements = card.requirements
         super().__init__(scenario, num_worlds)
         self.action = np.zeros((num_worlds, scenario.swarm.num_vehicles, 2), np.float32)
 
@@ -64,7 +64,7 @@ class Group:
         self.collision_cost = 0.0
         """Cost of a collision beyond the reward."""
         try:
-            self._expert = make(training.expert, scenario, part.worlds) if training.expert else None
+            self._expert = make_policy(training.expert, scenario, part.worlds) if training.expert else None
         except PolicyError as error:
             raise TrainingError(f"expert = {training.expert!r} can't run on {part.name}: {error}") from None
         self.expert_share = 1.0

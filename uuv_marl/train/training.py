@@ -1,7 +1,7 @@
 """``Training``: the description of a training, read from a TOML recipe and saved in a run's ``config.json``."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, Any, Literal, NamedTuple, Self, cast
 
@@ -11,13 +11,14 @@ from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import Card, card_of
 from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.baselines.making import check_base_controller
-from uuv_marl.baselines.policy import Policy
-from uuv_marl.baselines.requirements import inner_loop_nms
-from uuv_marl.envs.core import Reward, refuse_losses
-from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError, hint
+from uuv_marl.baselines.requirements import FULL_TORQUE_NM, inner_loop_nms
+from uuv_marl.envs.changes import Reward
+from uuv_marl.envs.core import refuse_losses
+from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
 from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario.messages import explain
 from uuv_marl.scenario.overrides import assign, plain
 
 _PERIOD, _LOOP, _LOOP_NMS = "timing.decision_period_s", "actuators.yaw_damping_nms", 600.0
@@ -145,7 +146,9 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
         try:
             super().__init__(**plain(fields))
         except pydantic.ValidationError as error:
-            raise _explained(error) from None
+            cause = error.errors()[0].get("ctx", {}).get("error")
+            known = isinstance(cause, ScenarioError | TrainingError | PolicyError)
+            raise (cause if known else TrainingError(explain(error, fields, type(self)))) from None
 
     @pydantic.model_validator(mode="after")
     def _check(self) -> Self:
@@ -225,7 +228,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
 
     def reward_for(self, scenario: Scenario) -> Reward:
         """The reward on a scenario. Raises RewardError where it can't be imported."""
-        name = self.reward or scenario.task_class.rewards[0]
+        name = self.reward or next(iter(scenario.task_class.rewards))
         if ":" not in name:
             return cast(Reward, name)
         try:
@@ -252,7 +255,7 @@ def overrides_for(scenario: str, own: Mapping[str, object]) -> dict[str, object]
     bare = load_scenario(scenario, overrides={**clock, **own, _LOOP: own.get(_LOOP, 0.0)})
     if bare.timing.fixed:
         return dict(own)
-    return {**OVERRIDES, _LOOP: inner_loop_nms(_LOOP_NMS, Policy.full_torque_nm, bare), **own}
+    return {**OVERRIDES, _LOOP: inner_loop_nms(_LOOP_NMS, FULL_TORQUE_NM, bare), **own}
 
 
 def recipe_fields(name: str) -> dict[str, Any]:
@@ -276,10 +279,8 @@ def recipe_fields(name: str) -> dict[str, Any]:
     return fields if "scenario" in fields else {"scenario": name}
 
 
-TABLES: Mapping[str, Sequence[str]] = {
-    "": [*Training.model_fields], "ppo": [*Ppo.model_fields], "network": [*Architecture.model_fields],
-}  # fmt: skip
-"""Names of all fields, by table."""
+TABLES = ("ppo", "network")
+"""Fields that are tables."""
 
 
 def changed_fields(fields: dict[str, Any], changes: Mapping[str, object]) -> dict[str, Any]:
@@ -296,18 +297,3 @@ def changed_fields(fields: dict[str, Any], changes: Mapping[str, object]) -> dic
         else:
             fields.setdefault("overrides", {})[field] = value
     return fields
-
-
-def _explained(error: pydantic.ValidationError) -> Exception:
-    """What is wrong first, as an error of ours."""
-    first = error.errors()[0]
-    if first["type"] == "value_error" and "ctx" in first:
-        cause = first["ctx"]["error"]
-        return cause if isinstance(cause, ScenarioError | TrainingError | PolicyError) else TrainingError(str(cause))
-    *place, last = map(str, first["loc"])
-    field = ".".join([*place, last])
-    if first["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        names = TABLES.get(".".join(place), ())
-        remedy = hint(last, names, 0.6) or f"the fields here are {', '.join(names)}"
-        return TrainingError(f"{field} is unknown; {remedy.strip()}")
-    return TrainingError(f"{field} {first['msg'].removeprefix('Input ')}, got {first['input']!r}")

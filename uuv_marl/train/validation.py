@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.benchmark.evaluate import Run, evaluate
+from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.replay.command import command
 from uuv_marl.scenario import load_scenario
@@ -69,7 +69,7 @@ def validate(policy: str, training: Training) -> Validation:
 
 def _runs(policy: str, part: Part, seeds: Sequence[int]) -> Iterator[Run]:
     scenario = with_policy_requirements(policy, part.scenario)
-    yield from (event for event in evaluate(scenario, policy, seeds) if isinstance(event, Run))
+    yield from (event for event in episodes(scenario, policy, seeds) if isinstance(event, Run))
 
 
 def _end_s(run: Run) -> float:

@@ -1,1 +1,1 @@
-"""``tangent_bug``: the strongest hand-made law here for water with walls."""
+"""``tangent_bug``: the strongest hand-made controller for water with walls."""

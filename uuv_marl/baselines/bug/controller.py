@@ -1,7 +1,7 @@
-"""The law for water with walls: it goes round what blocks its way, as TangentBug does, and keeps to the safety filter.
+"""``TangentBug``: a controller for water with walls, which passes obstacles on one side and applies the safety filter.
 
-The wished velocity leads along the chosen way, with pushes from near neighbours; it is made safe against every echo
-that is remembered, and against neighbours.
+The desired velocity follows the chosen direction, with pushes from near neighbours; it is made safe against all
+remembered echoes and against neighbours.
 """
 
 import math
@@ -24,14 +24,14 @@ from uuv_marl.types import Bool, Float32, Float64
 
 
 class TangentBug(Filtered):
-    """To the goal, or past the end of what blocks the way; pushes among near neighbours, and the safety filter.
+    """Towards the goal, or past the end of an obstacle; pushes among near neighbours, and the safety filter.
 
-    Made for goals at rest: then the vector to the goal tells a vehicle's place, up to its heading.
+    Made for goals at rest: the vector to the goal then gives a vehicle's position, up to its heading.
 
     Args:
         tuned_for: ``two_swarms``, or "" for hard water.
-        gains: of the way and of the wished velocity, instead of the tuned ones.
-        barrier: margins and rates of the filter, instead of the tuned ones.
+        gains: replace the tuned ones.
+        barrier: margins and rates of the safety filter; replace the tuned ones.
     """
 
     Memory: ClassVar[type[Any] | None] = WallsMemory
@@ -49,7 +49,7 @@ class TangentBug(Filtered):
         self._view = rays(), rays(), np.zeros(RAYS)
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Update the memory from the percept, and choose the way."""
+        """Update the memory and choose directions."""
         flat, at = self.flat(percept), self.layout.offsets
         update_memory(flat, at, worlds, self.model, self.memory_s, self._surroundings)
         update_walls(flat, at, worlds, self.model.sectors, self._surroundings, self._walls)
@@ -67,7 +67,7 @@ class TangentBug(Filtered):
 
 @compiled
 def _desired_velocity(w: int, i: int, g: BugGains, memory: Surroundings, walls: Walls) -> tuple[float, float]:
-    """The velocity that a vehicle wishes, in its map [m/s]."""
+    """Desired velocity in the vehicle's map [m/s]."""
     pose, goal = memory.pose[w, i], memory.reference[w, i]
     speed = min(g.cruise, g.pull * math.hypot(goal[0] - pose[0], goal[1] - pose[1]))
     return pushed(
@@ -80,7 +80,6 @@ def _decide_all(
     worlds: Bool, period: float, g: BugGains, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings,
     walls: Walls, planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
-    """The law for every vehicle."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and memory.begun[w, i] > 0.0:

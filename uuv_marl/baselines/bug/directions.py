@@ -1,7 +1,7 @@
-"""Which way a vehicle goes: to the goal, or past the end of what blocks the way, on one side.
+"""Direction of a vehicle: to the goal, or past the end of an obstacle, on one side.
 
 TangentBug (Kamon, Rimon and Rivlin, TangentBug: a range-sensor-based navigation algorithm, International Journal of
-Robotics Research 17(9), 1998), with all that is remembered as its view. What nothing is known of counts as free.
+Robotics Research 17(9), 1998), with all remembered echoes as its view. Unknown space counts as free.
 """
 
 import math
@@ -15,29 +15,21 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.types import Bool, Float64
 
-RAYS = 120
-"""Directions in which a vehicle looks, the first to the goal, then clockwise."""
-_FREE_M = 1e6
-"""Where nothing is known [m]."""
+RAYS = 120  # number of candidate directions, the first to the goal, then clockwise
+_FREE_M = 1e6  # free distance where no echo is known [m]
 
 
 def rays() -> Float64:
-    """Unit vectors of the directions, from the one to the goal, shape (ray, 2)."""
+    """Unit vectors of the directions relative to the goal's, shape (ray, 2)."""
     return np.array([cos_sin(2.0 * math.pi * k / RAYS) for k in range(RAYS)])
 
 
 @compiled
 def look_round(w: int, i: int, stand: float, memory: Surroundings, walls: Walls, looks: Float64, free: Float64) -> None:
-    """How far every direction is free, ``stand`` [m] off what is remembered.
+    """Fill ``free``, shape (ray,), with the collision-free distance along each direction [m].
 
-    Args:
-        w: world.
-        i: vehicle.
-        stand: distance to keep [m]; where a vehicle is nearer, it must not come nearer still.
-        kept: where it is.
-        walls: what it remembers.
-        looks: unit vectors in the vehicle's map, shape (ray, 2).
-        free: filled with distances [m], shape (ray,).
+    ``looks`` are unit vectors in the vehicle's map, shape (ray, 2); ``stand`` is the clearance [m]. From a position
+    nearer than that, directions are free that do not reduce the distance.
     """
     free[:] = _FREE_M
     for k in range(int(walls.num[w, i])):
@@ -52,12 +44,10 @@ def look_round(w: int, i: int, stand: float, memory: Surroundings, walls: Walls,
 
 @compiled
 def past(side: int, reach: float, away: float, looks: Float64, free: Float64) -> tuple[int, float]:
-    """The first free direction on one side of the goal's, and the length of the way past its end to the goal [m].
+    """The first free direction on one side of the goal's, and the length of the path past its end to the goal [m].
 
-    ``reach``: how far it must be free [m]; ``away``: distance of the goal [m].
-
-    Returns:
-        Index of the direction, 0 where none is free, and the length.
+    ``side`` is 1 or -1, ``reach`` the distance for which it must be free [m], ``away`` the goal's distance [m];
+    ``looks`` and ``free`` as for ``look_round``. The index is 0 where no direction is free.
     """
     num, last = looks.shape[0], 0
     for turn in range(1, num):
@@ -71,7 +61,7 @@ def past(side: int, reach: float, away: float, looks: Float64, free: Float64) ->
 
 @compiled
 def chosen_ray(w: int, i: int, away: float, g: BugGains, walls: Walls, looks: Float64, free: Float64) -> int:
-    """The direction to go in; what was decided is remembered. Arguments as for ``past``."""
+    """Index of the direction to take; the chosen side is stored in ``walls``. Arguments as for ``past``."""
     side = int(walls.side[w, i])
     near = free[0] >= min(g.look_m, away) and (side == 0 or away < walls.hit_m[w, i] - g.nearer_m)
     if near or free[0] >= away:
@@ -95,10 +85,10 @@ def chosen_ray(w: int, i: int, away: float, g: BugGains, walls: Walls, looks: Fl
 def choose_directions(
     worlds: Bool, g: BugGains, turns: Float64, looks: Float64, free: Float64, memory: Surroundings, walls: Walls
 ) -> None:
-    """Choose every vehicle's way.
+    """Choose every vehicle's direction.
 
-    ``turns``: unit vectors of the directions, from the one to the goal; ``looks`` and ``free``: room for what
-    ``look_round`` gives.
+    ``turns`` are unit vectors relative to the goal's direction, shape (ray, 2); ``looks`` (ray, 2) and ``free`` (ray,)
+    are work arrays of ``look_round``.
     """
     for w in range(worlds.shape[0]):
         for i in range(walls.num.shape[1] if worlds[w] else 0):

@@ -1,6 +1,6 @@
-"""What a vehicle remembers of walls: every echo, as a point of a surface, or as the disc whose centre it reports.
+"""Memory of walls: every echo, as a point of a surface, or as the disc whose centre it reports.
 
-``memory.discs`` keeps twelve discs, which is enough for separate obstacles; walls have hundreds.
+``memory.discs`` holds twelve discs, enough for separate obstacles; walls have hundreds of points.
 """
 
 import math
@@ -19,32 +19,30 @@ from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import fields
 from uuv_marl.types import Bool, Float32, Float64
 
-SAME_M = 2.0
-"""An echo this near to a remembered one takes its place [m]. Assumed: less than any radius of a disc."""
+SAME_M = 2.0  # an echo this near to a remembered one replaces it [m]. Assumed: less than any disc's radius.
 
 
 @described
 class Walls(NamedTuple):
-    """Echoes in the vehicle's map, and on which side it passes what blocks its way."""
+    """Echoes in the vehicle's map, and the side on which it passes an obstacle."""
 
-    echoes: Annotated[Float64, "world vehicle 384 3", "Place in the map, and radius, 0 for a point [m]; a ring."]
-    num: Annotated[Float64, "world vehicle", "How many are remembered."]
-    next: Annotated[Float64, "world vehicle", "Where the next goes that is far from all others."]
-    side: Annotated[Float64, "world vehicle", "1 where it turns to starboard, -1 to port, 0 on the way to the goal."]
-    hit_m: Annotated[Float64, "world vehicle", "Distance of the goal when the way was blocked [m]."]
-    turned: Annotated[Float64, "world vehicle", "How often it turned back since then."]
-    direction: Annotated[Float64, "world vehicle 2", "Unit vector of the way in the map."]
+    echoes: Annotated[Float64, "world vehicle 384 3", "Position in the map, and radius, 0 for a point [m]; a ring."]
+    num: Annotated[Float64, "world vehicle", "Number of echoes."]
+    next: Annotated[Float64, "world vehicle", "Index of the next new echo."]
+    side: Annotated[Float64, "world vehicle", "1 where it passes to starboard, -1 to port, 0 on the line to the goal."]
+    hit_m: Annotated[Float64, "world vehicle", "Distance of the goal when the line to it was blocked [m]."]
+    turned: Annotated[Float64, "world vehicle", "Number of reversals since then."]
+    direction: Annotated[Float64, "world vehicle 2", "Unit vector of its direction in the map."]
 
 
-WallsMemory = with_surroundings("WallsMemory", Walls)
-"""What ``tangent_bug`` remembers: its surroundings, and then its walls."""
+WallsMemory = with_surroundings("WallsMemory", Walls)  # memory of ``tangent_bug``: surroundings, then walls
 
 
 @compiled
 def update_walls(
     flat: Float32, at: Starts, worlds: Bool, sectors: ActiveSectors, memory: Surroundings, walls: Walls
 ) -> None:
-    """Take every vehicle's echoes into its walls. ``flat`` and ``at``: the percept, and where its fields start."""
+    """Add every vehicle's echoes to its walls."""
     see = fields(flat, at)
     for w in range(worlds.shape[0]):
         for i in range(walls.num.shape[1] if worlds[w] else 0):
@@ -63,7 +61,7 @@ def update_walls(
 
 @compiled
 def _put(w: int, i: int, x: float, y: float, radius: float, walls: Walls) -> None:
-    """Remember an echo, in the place of the one that it repeats, or of the oldest."""
+    """Store an echo in place of the one that it repeats, or of the oldest."""
     echoes, at = walls.echoes[w, i], int(walls.next[w, i])
     for k in range(int(walls.num[w, i])):
         if max(abs(echoes[k, 0] - x), abs(echoes[k, 1] - y)) < SAME_M:
@@ -79,11 +77,7 @@ def _put(w: int, i: int, x: float, y: float, radius: float, walls: Walls) -> Non
 def wall_planes(
     w: int, i: int, period: float, barrier: Barrier, limits: Limits, memory: Surroundings, walls: Walls, planes: Float64
 ) -> int:
-    """Half-planes of velocity in the vehicle's map, n . v <= b, for the walls near enough to matter.
-
-    Returns:
-        How many there are.
-    """
+    """Write the half-planes n . v <= b of near walls in the vehicle's map; returns their number."""
     pose, rate, num = memory.pose[w, i], min(barrier.obstacle_rate, MOST_CLOSED / period), 0
     fastest = full_speed(limits)
     for k in range(int(walls.num[w, i])):

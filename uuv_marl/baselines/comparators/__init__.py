@@ -1,1 +1,1 @@
-"""Laws from published equations, and one that only pulls."""
+"""Controllers from published equations, and proportional tracking."""

@@ -1,52 +1,47 @@
-"""Artificial potential field (APF): Khatib 1986, with the repulsion by obstacles of Ge and Cui 2000.
+"""Artificial potential field (APF): Khatib 1986, with the obstacle repulsion of Ge and Cui 2000.
 
 O. Khatib, Real-time obstacle avoidance for manipulators and mobile robots, Int. J. Robotics Research 5(1), 90-98: a
-quadratic well at the goal, and a repulsion that ends at a set distance, here also among neighbours. S. S. Ge and Y. J.
-Cui, New potential functions for mobile robot path planning, IEEE Trans. Robotics and Automation 16(5), 615-620: the
-repulsion by obstacles is weighted with the squared distance to the goal, so that an obstacle near the goal does not
-keep the vehicle from it (GNRON: goals nonreachable with obstacles nearby). The goal is l(t).
+quadratic well at the goal, and a repulsion of finite range, here also among neighbours. S. S. Ge and Y. J. Cui, New
+potential functions for mobile robot path planning, IEEE Trans. Robotics and Automation 16(5), 615-620: the repulsion by
+obstacles is weighted with the squared distance to the goal, so that a goal near an obstacle remains reachable. The goal
+is l(t).
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.paper.bio_inspired import MIN_DISTANCE_M, counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.baselines.requirements import PolicyRequirements
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Int64
 
 
 class ApfGains(NamedTuple):
     """Free parameters, found by tuning."""
 
-    attraction: float
-    """xi: pull to l(t) per distance [N/m]."""
-    obstacle: float
-    """eta: repulsion by obstacles, with Ge and Cui's n = 2 [N m]."""
-    obstacle_range: float
-    """rho_0: distance to a surface at which it ends [m]."""
-    neighbour: float
-    """eta of neighbours [N m^3]."""
-    neighbour_range: float
-    """rho_0 of neighbours [m]."""
+    attraction: float  # xi: pull to l(t) per distance [N/m]
+    obstacle: float  # eta: repulsion by obstacles, with Ge and Cui's n = 2 [N m]
+    obstacle_range: float  # rho_0: distance to a surface at which it ends [m]
+    neighbour: float  # eta of neighbours [N m^3]
+    neighbour_range: float  # rho_0 of neighbours [m]
 
 
 class Apf(Policy):
-    """Artificial potential field: a well at l(t), hills at neighbours, and at obstacles weighted by the way to l(t).
+    """Artificial potential field: a well at l(t), hills at neighbours and obstacles, those weighted by l(t)'s distance.
 
     Args:
         tuned_for: ``two_swarms``, or "" for the paper's scenarios.
-        gains: instead of the tuned ones.
+        gains: replace the tuned ones.
     """
 
-    outputs_force: ClassVar[bool] = True
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: ApfGains | None = None
@@ -70,10 +65,8 @@ def apf_obstacle_force(
     """Force [N] from an obstacle: the negative gradient of eta / 2 (1 / rho - 1 / rho_0)^2 rho_goal^2 within rho_0.
 
     Ge and Cui 2000, with n = 2: one part points away from the obstacle, one to the goal. n is a unit vector to the
-    surface's nearest point, ``rho`` the distance to it [m], l the goal [m].
-
-    Returns:
-        The force, forward and to starboard, and 1 where the distance's bound binds.
+    nearest surface point, ``rho`` its distance [m], l the vector to the goal [m]. Returns the force, forward and to
+    starboard, and 1 if the bound on the distance is active.
     """
     near = max(rho, MIN_DISTANCE_M)
     if near >= g.obstacle_range:
@@ -97,7 +90,6 @@ def apf_neighbour_force(p_x: float, p_y: float, g: ApfGains) -> tuple[float, flo
 
 @compiled
 def _act(flat: Float32, at: Starts, g: ApfGains, limits: Limits, centres: bool, action: Float32, clamps: Int64) -> None:
-    """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -108,7 +100,7 @@ def _act(flat: Float32, at: Starts, g: ApfGains, limits: Limits, centres: bool, 
 
 @compiled
 def _force(w: int, i: int, see: Fields, g: ApfGains, centres: bool) -> tuple[float, float, int]:
-    """Body-frame force on one vehicle [N], forward and to starboard, and how many bounds bound."""
+    """Body-frame force on one vehicle [N], forward and to starboard, and the number of active bounds."""
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     f_x, f_y, bound = g.attraction * l_x, g.attraction * l_y, 0
     for k in range(see.detected.shape[2]):

@@ -1,10 +1,10 @@
-"""Leader and follower by sonar: who does not perceive l(t) goes with whom it hears, and who does waits for them.
+"""Leader and followers by sonar: informed vehicles lead and wait, the others follow their neighbours.
 
-A follower wishes for a little more than the mean velocity of the neighbours that it remembers, nearer ones counting
-more, and to their mean place. A leader goes to l(t), slower the farther it is ahead of the mean place of those that it
-remembers. Both are pushed off near neighbours, bent round obstacles and made safe as ``scout``'s. So
-informed individuals lead groups in Couzin, Krause, Franks and Levin, Effective leadership and decision-making in animal
-groups on the move, Nature 433, 2005; waiting is ours.
+A follower's desired velocity is a little more than the mean velocity of the neighbours in its memory, near ones
+weighing more, and a pull to their mean position. A leader moves to l(t), slower the farther it is ahead of that mean
+position. Both are pushed off near neighbours, bent around obstacles and made safe as ``scout`` is. Informed individuals
+lead groups in this way in Couzin, Krause, Franks and Levin, Effective leadership and decision-making in animal groups
+on the move, Nature 433, 2005; waiting is added here.
 """
 
 import math
@@ -24,42 +24,29 @@ from uuv_marl.types import Bool, Float32, Float64
 
 
 class LeaderFollowerGains(NamedTuple):
-    """Free parameters. Those by default were found by hand; the policy has tuned ones."""
+    """Free parameters. The defaults were found by hand; the policy has tuned ones."""
 
+    # factor of the neighbours' mean velocity [1]; at 1 and below a swarm comes to rest by following itself
     follow: float = 1.05
-    """Factor of the neighbours' mean velocity [1]: above 1, or a swarm comes to rest by following itself."""
-    near: float = 15.0
-    """Their velocities count as e^(-distance / near) [m]."""
-    sightings: float = 3.0
-    """Their velocities count once they were heard so often [1]."""
-    gather: float = 0.4
-    """A follower's pull to their mean place [1/s]."""
-    gather_mps: float = 1.5
-    """The largest of these pulls [m/s]."""
-    pull: float = 0.15
-    """A leader's pull to l(t) [1/s]."""
-    ahead: float = 12.0
-    """A leader slows where it is farther ahead of their mean place [m]."""
-    stop: float = 37.0
-    """And stops here, to go back beyond [m]."""
-    speed: float = 4.0
-    """Largest speed that a leader wishes, but for pushes [m/s]."""
-    cruise: float = 4.0
-    """Largest that a follower wishes, but for gathering and pushes [m/s]; a large ``follow`` keeps a swarm at it."""
-    push: float = 10.0
-    """Away from a neighbour at no distance [m/s]."""
-    push_range: float = 15.0
-    """Where pushes end [m]."""
-    memory_s: float = 3.0
-    """For how long a neighbour is remembered that is heard no more [s]."""
+    near: float = 15.0  # their velocities are weighted by e^(-distance / near) [m]
+    sightings: float = 3.0  # number of detections from which their velocities count [1]
+    gather: float = 0.4  # a follower's pull to their mean position [1/s]
+    gather_mps: float = 1.5  # largest such pull [m/s]
+    pull: float = 0.15  # a leader's pull to l(t) [1/s]
+    ahead: float = 12.0  # a leader slows where it is farther ahead of their mean position [m]
+    stop: float = 37.0  # distance ahead at which it stops; beyond, it moves back [m]
+    speed: float = 4.0  # a leader's largest desired speed, without pushes [m/s]
+    cruise: float = 4.0  # a follower's, without gathering and pushes [m/s]; a large ``follow`` holds a swarm at it
+    push: float = 10.0  # away from a neighbour at distance 0 [m/s]
+    push_range: float = 15.0  # distance at which pushes end [m]
+    memory_s: float = 3.0  # time for which an undetected neighbour is remembered [s]
 
 
-_BACK = -0.3
-"""A leader that is too far ahead goes back at most at this share of its speed [1]. Assumed."""
+_BACK = -0.3  # largest speed back of a leader that is too far ahead, as a share of its speed [1]. Assumed.
 
 
 class LeaderFollower(Filtered):
-    """Who perceives l(t) leads and waits; the others go with whom they hear, by remembered positions alone."""
+    """Informed vehicles lead and wait; the others follow their neighbours, from remembered positions alone."""
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, gains: LeaderFollowerGains | None = None,
@@ -71,7 +58,7 @@ class LeaderFollower(Filtered):
 
     @property
     def memory_s(self) -> float:
-        """For how long a neighbour is remembered that is heard no more [s]."""
+        """Time for which an undetected neighbour is remembered [s]."""
         return float(self.gains.memory_s)
 
     def decide(self, percept: Percept) -> Float32:
@@ -87,19 +74,17 @@ class LeaderFollower(Filtered):
 
 
 class NeighbourSummary(NamedTuple):
-    """What a vehicle makes of its neighbours, along its map's axes."""
+    """Mean velocity [m/s] of a vehicle's neighbours, and mean position from it [m], in its map."""
 
     v_x: float
     v_y: float
-    """Their mean velocity [m/s]."""
     x: float
     y: float
-    """Their mean place from the vehicle [m]."""
 
 
 @compiled
 def remembered(w: int, i: int, g: LeaderFollowerGains, memory: Surroundings) -> NeighbourSummary:
-    """What it makes of those that it remembers."""
+    """Summary of the neighbours in a vehicle's memory."""
     v_x, v_y, weights, x, y, num = 0.0, 0.0, 1e-9, 0.0, 0.0, 0
     for k in range(memory.known.shape[2]):
         if memory.known[w, i, k] > 0.0:
@@ -117,14 +102,14 @@ def remembered(w: int, i: int, g: LeaderFollowerGains, memory: Surroundings) -> 
 
 @compiled
 def at_most(x: float, y: float, length: float) -> tuple[float, float]:
-    """A vector no longer than that."""
+    """The vector, shortened to a length if it is longer."""
     share = min(length / max(math.hypot(x, y), 1e-9), 1.0)
     return share * x, share * y
 
 
 @compiled
 def _following(others: NeighbourSummary, g: LeaderFollowerGains) -> tuple[float, float]:
-    """The velocity that a follower wishes [m/s]."""
+    """Desired velocity of a follower [m/s]."""
     w_x, w_y = at_most(g.follow * others.v_x, g.follow * others.v_y, g.cruise)
     g_x, g_y = at_most(g.gather * others.x, g.gather * others.y, g.gather_mps)
     return w_x + g_x, w_y + g_y
@@ -134,7 +119,7 @@ def _following(others: NeighbourSummary, g: LeaderFollowerGains) -> tuple[float,
 def _leading(
     w: int, i: int, others: NeighbourSummary, g: LeaderFollowerGains, memory: Surroundings
 ) -> tuple[float, float]:
-    """The velocity that a leader wishes [m/s]."""
+    """Desired velocity of a leader [m/s]."""
     at, speed = memory.reference[w, i], memory.reference_speed[w, i]
     to_x, to_y = at[0] - memory.pose[w, i, 0], at[1] - memory.pose[w, i, 1]
     w_x, w_y = at_most(speed * at[2] + g.pull * to_x, speed * at[3] + g.pull * to_y, g.speed)
@@ -148,7 +133,7 @@ def _act(
     leads: Float32, worlds: Bool, period: float, g: LeaderFollowerGains, barrier: Barrier, limits: Limits, gain: float,
     memory: Surroundings, planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
-    """The law for every vehicle; ``leads`` has shape (world, vehicle, 1)."""
+    """Write every vehicle's action. ``leads`` has shape (world, vehicle, 1)."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and memory.begun[w, i] > 0.0:

@@ -3,10 +3,12 @@
 R. Olfati-Saber, IEEE Trans. Automatic Control 51(3), 401-420, 2006. Vehicles are alpha-agents that attract and repel
 each other towards a lattice; the nearest point of an obstacle's surface is a beta-agent that repels and brakes; the
 reference point is the gamma-agent. The source's lengths have no unit; here ``unit`` metres stand for 1. Forces stand
-for the source's accelerations. Its agents meet no resistance, so vehicles balance theirs at the reference's velocity.
+for the source's accelerations. Its agents move without resistance, so vehicles compensate theirs at the reference's
+velocity.
 
-A vehicle that does not perceive l(t) has no gamma-agent and balances its resistance at its own velocity. With alignment
-that is the extension by Su, Wang and Lin, Flocking of multi-agents with a virtual leader, ibid. 54(2), 293-307, 2009.
+A vehicle that does not perceive l(t) has no gamma-agent and compensates its resistance at its own velocity. With
+alignment that is the extension by Su, Wang and Lin, Flocking of multi-agents with a virtual leader, ibid. 54(2),
+293-307, 2009.
 """
 
 import math
@@ -17,54 +19,39 @@ import numpy as np
 from uuv_marl.baselines.avoidance import bump, obstacle_at
 from uuv_marl.baselines.paper.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, surge_resistance, tuned, write_action
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.baselines.requirements import PolicyRequirements
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32
 
-EPSILON = 0.1
-"""Parameter of the sigma-norm, as in the source's simulations [1]."""
-_H_ALPHA = 0.2
-"""Share of the reach up to which neighbours count wholly, in the source's simulations [1]."""
-_H_BETA = 0.9
-"""The same share for obstacles [1]."""
+EPSILON = 0.1  # parameter of the sigma-norm, as in the source's simulations [1]
+_H_ALPHA = 0.2  # share of the reach within which neighbours have full weight, as in the source's simulations [1]
+_H_BETA = 0.9  # the same share for obstacles [1]
 
 
 class OlfatiSaberGains(NamedTuple):
     """Free parameters, found by tuning; the source's symbols in brackets."""
 
-    unit: float
-    """Length that stands for 1 of the source, in which forces change over a length of about 1 [m]."""
-    spacing: float
-    """Spacing of the lattice (d) [m]."""
-    reach: float
-    """Distance at which neighbours' forces end, by the spacing (r / d; 1.2 in the source) [1]."""
-    attraction: float
-    """Scale of the attraction by a neighbour beyond the spacing (c_1 a), which is about 3 times this [N]."""
-    repulsion: float
-    """Scale of the repulsion by a neighbour nearer than the spacing (c_1 b) [N]."""
-    obstacle: float
-    """Scale of the repulsion by an obstacle (c_1 of beta), which is up to 6 times this [N]."""
-    obstacle_range: float
-    """Distance to a surface at which it ends (d') [m]."""
-    obstacle_damping: float
-    """Against the velocity relative to an obstacle's nearest point (c_2 of beta) [N s/m]."""
-    pull: float
-    """Largest pull to l(t) (c_1 of gamma) [N]."""
-    pull_length: float
-    """Distance at which it is 0.7 of that; 1 in the source [m]."""
-    reference_velocity: float
-    """Damping towards the reference's velocity (c_2 of gamma) [N s/m]."""
-    alignment: float = 0.0
-    """Damping towards each neighbour's velocity (c_2 of alpha) [N s/m]; 0 without these velocities."""
+    unit: float  # length that stands for 1 of the source, over which forces change by about 1 [m]
+    spacing: float  # spacing of the lattice (d) [m]
+    reach: float  # range of neighbours' forces, by the spacing (r / d; 1.2 in the source) [1]
+    attraction: float  # scale of attraction beyond the spacing (c_1 a), which is about 3 times this [N]
+    repulsion: float  # scale of repulsion within the spacing (c_1 b) [N]
+    obstacle: float  # scale of repulsion by an obstacle (c_1 of beta), which is up to 6 times this [N]
+    obstacle_range: float  # distance to a surface at which it ends (d') [m]
+    obstacle_damping: float  # of the velocity relative to an obstacle's nearest point (c_2 of beta) [N s/m]
+    pull: float  # largest pull to l(t) (c_1 of gamma) [N]
+    pull_length: float  # distance at which it is 0.7 of that; 1 in the source [m]
+    reference_velocity: float  # damping towards the reference's velocity (c_2 of gamma) [N s/m]
+    alignment: float = 0.0  # damping towards each neighbour's velocity (c_2 of alpha) [N s/m]; 0 without ``link``
 
 
 class OlfatiSaber(Policy):
     """Olfati-Saber's flocking without alignment: lattice, obstacles and navigation, from positions alone."""
 
-    outputs_force: ClassVar[bool] = True
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
     tuned_as: ClassVar[str] = "olfati_saber"
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: OlfatiSaberGains | None = None) -> None:
@@ -83,19 +70,19 @@ class OlfatiSaber(Policy):
 class OlfatiSaberInformed(OlfatiSaber):
     """``OlfatiSaber`` with alignment: every vehicle also follows its neighbours' velocities."""
 
-    channels: ClassVar[tuple[str, ...]] = ("link",)
+    requirements = OlfatiSaber.requirements._replace(channels=("link",))
     tuned_as: ClassVar[str] = "olfati_saber_informed"
 
 
 @compiled
 def sigma_norm(distance: float) -> float:
-    """A norm that is smooth at zero, of a distance in the source's lengths [1]."""
+    """The source's norm, smooth at zero, of a distance in its lengths [1]."""
     return (math.sqrt(1.0 + EPSILON * distance * distance) - 1.0) / EPSILON
 
 
 @compiled
 def slope(distance: float) -> float:
-    """Its derivative [1]: the length of the source's n_ij."""
+    """Derivative of ``sigma_norm`` [1]: the length of the source's n_ij."""
     return distance / math.sqrt(1.0 + EPSILON * distance * distance)
 
 
@@ -113,7 +100,7 @@ def rho_h(z: float, h: float) -> float:
 
 @compiled
 def phi_alpha(z: float, g: OlfatiSaberGains) -> float:
-    """Attraction [N] at a sigma-norm z of the distance to a neighbour; negative repels, 0 at the spacing."""
+    """Attraction [N] at a sigma-norm z of a neighbour's distance, 0 at the spacing; negative repels."""
     a, b = g.attraction, g.repulsion
     c = abs(a - b) / math.sqrt(4.0 * a * b)
     # Zero at the spacing also where attraction is the stronger, which the source excludes.
@@ -123,7 +110,7 @@ def phi_alpha(z: float, g: OlfatiSaberGains) -> float:
 
 @compiled
 def alpha_weight(z: float, g: OlfatiSaberGains) -> float:
-    """How much a neighbour counts at a sigma-norm z of its distance, from 1 to 0 [1]. a_ij of the source."""
+    """Weight of a neighbour at a sigma-norm z of its distance, from 1 to 0 [1]. a_ij of the source."""
     return rho_h(z / sigma_norm(g.reach * g.spacing / g.unit), _H_ALPHA)
 
 
@@ -135,7 +122,7 @@ def neighbour_attraction(distance: float, g: OlfatiSaberGains) -> float:
 
 @compiled
 def beta_weight(reach: float, g: OlfatiSaberGains) -> float:
-    """How much an obstacle counts at a distance to its surface [m], from 1 to 0 [1]. b_ik of the source."""
+    """Weight of an obstacle at a distance to its surface [m], from 1 to 0 [1]. b_ik of the source."""
     return rho_h(sigma_norm(reach / g.unit) / sigma_norm(g.obstacle_range / g.unit), _H_BETA)
 
 
@@ -148,7 +135,6 @@ def obstacle_repulsion(reach: float, g: OlfatiSaberGains) -> float:
 
 @compiled
 def _act(flat: Float32, at: Starts, g: OlfatiSaberGains, limits: Limits, centres: bool, action: Float32) -> None:
-    """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -168,7 +154,7 @@ def _act(flat: Float32, at: Starts, g: OlfatiSaberGains, limits: Limits, centres
 
 @compiled
 def _alpha(w: int, i: int, see: Fields, g: OlfatiSaberGains) -> tuple[float, float]:
-    """Force [N] from neighbours: the lattice, and alignment where their velocities are told."""
+    """Force [N] from neighbours: the lattice, and alignment where their velocities are known."""
     u, v, f_x, f_y = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), 0.0, 0.0
     for k in range(see.detected.shape[2]):
         if see.detected[w, i, k] == 0.0:
@@ -188,8 +174,8 @@ def _alpha(w: int, i: int, see: Fields, g: OlfatiSaberGains) -> tuple[float, flo
 def _beta(w: int, i: int, see: Fields, g: OlfatiSaberGains, centres: bool) -> tuple[float, float]:
     """Force [N] from obstacles: away from each one's nearest point, and against the velocity relative to it.
 
-    That point runs along the surface as the vehicle's shadow: at radius / distance of the velocity across. Where echoes
-    are points of surfaces, the radius is unknown and the point stands.
+    That point moves along the surface at radius / distance of the vehicle's velocity across. It stands still where
+    echoes are points of surfaces, whose radius is unknown.
     """
     u, v, f_x, f_y = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), 0.0, 0.0
     for a in range(see.echo.shape[2]):

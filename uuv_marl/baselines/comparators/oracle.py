@@ -1,58 +1,46 @@
-"""``oracle``: sees the map of ``hard_water`` and follows its way; the proof that maps can be passed, and no contender.
+"""``oracle``: knows the map of ``hard_water`` and follows a shortest path; shows that every map can be passed.
 
-Its wished velocity leads to a point ahead on the way that it is told (the channel ``way``), and off near neighbours.
-Of the velocities that come near no wall and no neighbour too fast, it takes the nearest to that. Who is nearer to that
-point goes first: it is pushed less, and keeps less distance, so that nobody gets stuck abreast at a gap.
+Its desired velocity leads to a point ahead on the given path (the channel ``path``), and off near neighbours. It takes
+the nearest velocity that approaches no wall and no neighbour too fast. Of two neighbours, the one nearer to that point
+has right of way: it is pushed less and keeps less distance, so that neither is blocked at a gap.
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from uuv_marl.baselines.policy import Limits, Policy
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Float64
 
 
 class OracleGains(NamedTuple):
     """Free parameters, found by hand on seeds from 10,000 on."""
 
-    speed: float = 4.2
-    """Along the way [m/s]."""
-    slow: float = 0.25
-    """Largest speed over the length of the way left [1/s]."""
-    wall: float = 2.6
-    """Least distance to walls [m]."""
-    wall_rate: float = 0.8
-    """Largest speed towards a wall, over the distance above that [1/s]."""
-    apart: float = 4.5
-    """Least distance to a neighbour that goes first [m]."""
-    apart_behind: float = 3.5
-    """Least distance to the others [m]."""
-    apart_rate: float = 0.5
-    """Largest speed towards a neighbour at rest, over the distance above that [1/s]."""
-    follow: float = 0.9
-    """What is added, as a share of the speed at which the neighbour goes away [1]."""
-    push: float = 2.5
-    """Speed away from a neighbour that goes first, at no distance [m/s]."""
-    push_behind: float = 1.25
-    """The same for the others [m/s]."""
-    push_range: float = 9.0
-    """Distance at which both end [m]."""
+    speed: float = 4.2  # along the path [m/s]
+    slow: float = 0.25  # largest speed over the length of the remaining path [1/s]
+    wall: float = 2.6  # least distance to walls [m]
+    wall_rate: float = 0.8  # largest speed towards a wall, over the distance above that [1/s]
+    apart: float = 4.5  # least distance to a neighbour with right of way [m]
+    apart_behind: float = 3.5  # least distance to the others [m]
+    apart_rate: float = 0.5  # largest speed towards a neighbour at rest, over the distance above that [1/s]
+    follow: float = 0.9  # share of a neighbour's speed away that is added to it [1]
+    push: float = 2.5  # speed away from a neighbour with right of way, at distance 0 [m/s]
+    push_behind: float = 1.25  # the same for the others [m/s]
+    push_range: float = 9.0  # distance at which both end [m]
 
 
 class Oracle(Policy):
-    """Sees the map of hard_water and follows a shortest way: no contender, the proof that each map can be passed."""
+    """Knows the map of hard_water and follows a shortest path: shows that each map can be passed."""
 
-    channels: ClassVar[tuple[str, ...]] = ("path", "link")
-    outputs_force: ClassVar[bool] = True
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(("path", "link"), yaw_damping_nms=600.0, outputs_force=True)
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: OracleGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
@@ -75,7 +63,6 @@ def _act(
     flat: Float32, at: Starts, path: Float32, length: Float32, walls: Float32, g: OracleGains, limits: Limits,
     gain: float, planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
-    """The law for every vehicle; ``planes`` is room for half-planes of velocities."""
     see, most = fields(flat, at), full_speed(limits)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -89,7 +76,7 @@ def _act(
 
 @compiled
 def _keep_off_walls(walls: Float32, most: float, g: OracleGains, planes: Float64) -> int:
-    """Fill ``planes`` with what walls at these vectors [m] let the velocity be; how many bind below ``most`` [m/s]."""
+    """Write half-planes of walls at these vectors [m], shape (wall, 2); returns how many bind below ``most`` [m/s]."""
     num = 0
     for k in range(walls.shape[0]):
         x, y = float(walls[k, 0]), float(walls[k, 1])
@@ -105,10 +92,9 @@ def _keep_off_walls(walls: Float32, most: float, g: OracleGains, planes: Float64
 def _keep_apart(
     w: int, i: int, see: Fields, x: float, y: float, most: float, g: OracleGains, planes: Float64, num: int
 ) -> tuple[float, float, int]:
-    """Likewise for neighbours, from row ``num`` on; (x, y) is the point ahead [m].
+    """Write the half-planes of neighbours from row ``num`` on; (x, y) is the point ahead [m].
 
-    Returns:
-        The push away from them [m/s], and how many planes there are then.
+    Returns the push away from them [m/s] and the number of planes.
     """
     p_x, p_y, ahead = 0.0, 0.0, math.hypot(x, y)
     for k in range(see.detected.shape[2]):

@@ -1,44 +1,39 @@
 """Optimal reciprocal collision avoidance (ORCA): van den Berg, Guy, Lin and Manocha, ISRR 2009 (Springer 2011).
 
-Of two vehicles on a course of collision within a horizon, each takes half of the smallest change of their relative
-velocity that avoids the collision; with an obstacle, the vehicle takes the whole change. Each demand is a half-plane of
-velocities. The vehicle takes the velocity nearest to its wished one that meets all demands; if none does, demands from
-obstacles go first.
+Of two vehicles that would collide within a horizon, each makes half of the smallest change of their relative velocity
+that avoids the collision; for an obstacle, the vehicle makes the whole change. Each constraint is a half-plane of
+velocities. The vehicle takes the velocity nearest to the desired one that meets all constraints; if none does, those of
+obstacles have priority.
 """
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.paper.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, Policy, tuned
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Float64
 
-_SHARE = 0.5
-"""Share of a change that a vehicle takes; its neighbour takes the other half. Definition of ORCA^tau_A|B."""
+_SHARE = 0.5  # share of a change that a vehicle makes; its neighbour makes the other half. Definition of ORCA^tau_A|B.
 
 
 class OrcaGains(NamedTuple):
     """Free parameters, found by tuning."""
 
-    radius: float
-    """Radius of the disc that stands for a vehicle: half the distance that two of them keep [m]."""
-    clearance: float
-    """Kept from obstacles' surfaces [m]."""
-    horizon: float
-    """tau: how far ahead collisions with neighbours are avoided [s]."""
-    obstacle_horizon: float
-    """How far ahead collisions with obstacles are avoided [s]."""
-    pull: float
-    """Wished velocity per distance to l(t), added to the reference's velocity [1/s]."""
+    radius: float  # half the distance that two vehicles keep [m]
+    clearance: float  # kept from obstacles' surfaces [m]
+    horizon: float  # tau: time ahead in which collisions with neighbours are avoided [s]
+    obstacle_horizon: float  # time ahead in which collisions with obstacles are avoided [s]
+    pull: float  # desired velocity per distance to l(t), added to the reference's velocity [1/s]
 
 
 class OrcaInformed(Policy):
@@ -46,12 +41,10 @@ class OrcaInformed(Policy):
 
     Args:
         tuned_for: ``two_swarms``, or "" for the paper's scenarios.
-        gains: instead of the tuned ones.
+        gains: replace the tuned ones.
     """
 
-    outputs_force: ClassVar[bool] = True
-    channels: ClassVar[tuple[str, ...]] = ("link",)
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(("link",), yaw_damping_nms=600.0, outputs_force=True)
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: OrcaGains | None = None
@@ -79,15 +72,12 @@ class OrcaInformed(Policy):
 def escape(
     p_x: float, p_y: float, radius: float, v_x: float, v_y: float, horizon: float, period: float
 ) -> tuple[float, float, float, float]:
-    """The smallest change u that takes a relative velocity to the edge of a velocity obstacle, and the normal there.
+    """The smallest change u of a relative velocity to the edge of a velocity obstacle, and the normal there.
 
-    The velocity obstacle holds the velocities that meet the disc within the horizon: a cone, cut off by a disc that is
-    ``horizon`` times smaller. From inside the disc, those that are still in it after a decision period. The normal
-    points out of it. Straight at the disc, starboard counts as the shorter way round. p is the disc's centre [m], v the
-    velocity relative to it [m/s], ``radius`` both vehicles' together [m].
-
-    Returns:
-        u_x, u_y [m/s], n_x, n_y.
+    The velocity obstacle holds the velocities that reach the disc within the horizon: a cone, cut off by a disc
+    ``horizon`` times smaller. From inside the disc, it holds those still inside after a decision period. The normal
+    points outwards. Head-on, starboard counts as the shorter side. p is the disc's centre [m], v the velocity relative
+    to it [m/s], ``radius`` the sum of both radii [m]. Returns u_x, u_y [m/s], n_x, n_y.
     """
     squared = p_x * p_x + p_y * p_y
     inside = squared <= radius * radius
@@ -109,9 +99,9 @@ def escape(
 
 @compiled
 def _add(planes: Float64, num: int, u: float, v: float, demand: tuple[float, float, float, float], share: float) -> int:
-    """Write the half-plane of velocities that take a share of a change; the number of planes then.
+    """Write the half-plane of a share of a velocity's change; returns the number of planes.
 
-    u and v are the vehicle's own velocity [m/s], ``demand`` is that of ``escape``, ``share`` of the change.
+    u and v are the vehicle's velocity [m/s], ``demand`` is the result of ``escape``.
     """
     u_x, u_y, n_x, n_y = demand
     planes[num, 0], planes[num, 1] = -n_x, -n_y
@@ -124,7 +114,7 @@ def _act(
     flat: Float32, at: Starts, g: OrcaGains, limits: Limits, speed: float, follow: float, period: float, centres: bool,
     planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
-    """The law for every vehicle. ``speed``: the vehicle's largest [m/s]; ``follow``: of ``velocity_gain`` [N s/m]."""
+    """Write every vehicle's action. ``speed`` is its largest [m/s]; ``follow`` is from ``velocity_gain`` [N s/m]."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -140,10 +130,7 @@ def _act(
 
 @compiled
 def _obstacles(w: int, i: int, see: Fields, g: OrcaGains, period: float, centres: bool, planes: Float64) -> int:
-    """Write the half-planes of obstacles, each once; how many. The vehicle takes the whole change.
-
-    Of points of surfaces the nearest counts.
-    """
+    """Write the half-planes of obstacles, each once, for the whole change; returns their number."""
     u, v, num = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1]), 0
     for a in range(see.echo.shape[2]):
         if see.echo[w, i, a] > 0.0 and counts_once(w, i, a, see, centres):
@@ -156,10 +143,9 @@ def _obstacles(w: int, i: int, see: Fields, g: OrcaGains, period: float, centres
 
 @compiled
 def _neighbours(w: int, i: int, see: Fields, g: OrcaGains, period: float, planes: Float64, num: int) -> int:
-    """Add the half-planes of neighbours; how many planes there are then.
+    """Write the half-planes of neighbours from row ``num`` on; returns the number of planes.
 
-    One whose velocity has not been told (``modem``) counts as moving like the reference point. Written from row ``num``
-    on.
+    A neighbour whose velocity is unknown (``modem``) is assumed to move like the reference point.
     """
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     for k in range(see.detected.shape[2]):

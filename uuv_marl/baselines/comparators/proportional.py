@@ -1,10 +1,11 @@
-"""The bare pull to the reference point: ``pull,safety_filter=true`` shows the effect of the safety filter alone."""
+"""Proportional tracking of the reference; ``safety_filter=true`` shows the effect of the safety filter alone."""
 
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from uuv_marl.baselines.policy import Limits, Policy
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.steering import steer, velocity_gain
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
@@ -14,17 +15,15 @@ from uuv_marl.types import Float32
 
 
 class ProportionalGains(NamedTuple):
-    """Gains of the wished velocity."""
+    """Gains of the desired velocity."""
 
-    pull: float = 0.05
-    """To l(t) [1/s]; as that of ``scout``."""
+    pull: float = 0.05  # to l(t) [1/s]; as that of ``scout``
 
 
 class ProportionalTracking(Policy):
-    """The velocity of l(t) and a pull to l(t); neighbours and obstacles are ignored. Meant for ``pull,safety_filter=true``."""
+    """The velocity of l(t) and a pull to l(t), without regard to neighbours and obstacles."""
 
-    outputs_force: ClassVar[bool] = True
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: ProportionalGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
@@ -41,7 +40,6 @@ class ProportionalTracking(Policy):
 
 @compiled
 def _act(flat: Float32, at: Starts, g: ProportionalGains, limits: Limits, gain: float, action: Float32) -> None:
-    """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):

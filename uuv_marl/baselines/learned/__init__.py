@@ -1,1 +1,1 @@
-"""Trained networks: from their checkpoints to policies, and to ONNX."""
+"""Trained networks: from checkpoints to policies, and to ONNX."""

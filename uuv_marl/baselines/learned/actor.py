@@ -1,4 +1,4 @@
-"""``Actor``: a policy whose network reads observations as closeness, in NumPy, with or without a memory."""
+"""``Actor``: a policy whose network maps observations as closeness to actions, in NumPy, with or without a memory."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -17,28 +17,28 @@ from uuv_marl.types import Bool, Float32
 
 
 class Remembered(NamedTuple):
-    """What a recurrent network remembers."""
+    """Memory of a recurrent network."""
 
     state: Annotated[Float32, "world vehicle unit", "State of the recurrent layer [1]."]
 
 
 class Actor(Policy):
-    """A checkpoint's network without memory, from what a vehicle perceives to its action. Deterministic.
+    """A checkpoint's network without memory, from a vehicle's percept to its action. Deterministic.
 
     Args:
-        name: of the policy in messages.
-        checkpoint: the network, and what it was trained on.
-        any_vehicle: whether it may run on a vehicle that it was not trained on.
+        name: the policy's name in messages.
+        checkpoint: the network and its card.
+        any_vehicle: whether it may run on a vehicle other than the training's.
 
     Raises:
-        PolicyError: the scenario has another percept, period, inner loop or vehicle than the training had.
+        PolicyError: percept, decision period, inner loop or vehicle differ from the training's.
     """
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, name: str, checkpoint: Checkpoint, any_vehicle: bool = False
     ) -> None:
         self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
-        self.copy_requirements(card)
+        self.requirements = card.requirements
         self.axes = {"unit": card.network.hidden[-1]}
         super().__init__(scenario, num_worlds)
         check_same_training(self, card, any_vehicle)
@@ -55,11 +55,11 @@ class Actor(Policy):
         return whole
 
     def _recalled(self) -> Float32 | None:
-        """What the vehicles of active worlds remember, shape (row, unit)."""
+        """State of the recurrent layer in active worlds, shape (row, unit)."""
         return None
 
     def _features(self, percept: Percept, worlds: Bool) -> Float32:
-        """What the layers see of the vehicles of these worlds, shape (row, entry)."""
+        """Features of the vehicles of these worlds, shape (row, entry)."""
         flat = self.flat(percept)
         chosen = Percept(flat if worlds.all() else flat[worlds], percept.layout)
         observation, observe = observer(chosen, self._seeing)
@@ -68,24 +68,23 @@ class Actor(Policy):
 
 
 class Recurrent(Actor):
-    """A checkpoint's network with a memory, made as ``Actor`` is."""
+    """A checkpoint's network with a memory; arguments as for ``Actor``."""
 
     Memory: ClassVar[type[Any] | None] = Remembered
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Take the latest observation into the recurrent layer's state."""
+        """Update the recurrent layer's state with the latest observation."""
         z, state = self._features(percept, worlds), self.memory.state
         before = state[worlds].reshape(-1, state.shape[2])
         state[worlds] = self._network.step(self._network.gates(z), before).reshape(state[worlds].shape)
 
     def _recalled(self) -> Float32:
-        """The recurrent layer's state."""
         return self.memory.state[self.active].reshape(-1, self.axes["unit"])
 
 
 @compiled
 def bound(action: Float32, disc: bool) -> None:
-    """Clip each number of actions (row, 2) to [-1, 1], as trainers do, and project them onto the unit disc if asked."""
+    """Clip actions (row, 2) to [-1, 1], as trainers do, and project them onto the unit disc if asked, in place."""
     for i in range(action.shape[0]):
         a_x, a_y = min(max(action[i, 0], -1.0), 1.0), min(max(action[i, 1], -1.0), 1.0)
         if disc:
@@ -94,20 +93,14 @@ def bound(action: Float32, disc: bool) -> None:
 
 
 def in_disc(policy: Policy) -> bool:
-    """Whether what a policy decides is a force, in the unit disc; else thrust and rudder, each up to 1."""
-    return policy.outputs_force or policy.scenario.actuators.kind != "rudder"
+    """Whether decisions lie in the unit disc (forces), else in the square (thrust and rudder)."""
+    return policy.requirements.outputs_force or policy.scenario.actuators.kind != "rudder"
 
 
 def check_same_training(policy: Policy, card: Card, any_vehicle: bool) -> None:
-    """Raise an error for a scenario that differs from the training's.
+    """Raise PolicyError if percept or vehicle of the policy's scenario differ from the training's.
 
-    Args:
-        policy: made for the scenario.
-        card: of the policy's checkpoint.
-        any_vehicle: whether the policy may run on a vehicle that it was not trained on.
-
-    Raises:
-        PolicyError: the percept or the vehicle differs.
+    ``any_vehicle``: whether the policy may run on a vehicle other than the training's.
     """
     scenario, name = policy.scenario, policy.name
     rows = card_rows(scenario)
@@ -116,7 +109,7 @@ def check_same_training(policy: Policy, card: Card, any_vehicle: bool) -> None:
         ("percept", then, now, "use a scenario with the sonar suite of its training")
     ]
     if not any_vehicle:
-        remedy = "use another policy, allow this vehicle with make(..., any_vehicle=True)"
+        remedy = "use another policy, allow this vehicle with make_policy(..., any_vehicle=True)"
         pairs.append(("vehicle", card.vehicle, vehicle_of(scenario), remedy))
     for what, old, new, remedy in pairs:
         other = next((field for field in {**old, **new} if old.get(field) != new.get(field)), None)

@@ -1,7 +1,7 @@
 """Checkpoints of learned policies: one safetensors file.
 
-The file holds the weights, and in its header a ``Card`` as JSON, which says what they were trained on. Loading a
-checkpoint executes no code.
+The file holds the weights, and in its header a ``Card`` as JSON that describes the training. Loading a checkpoint
+executes no code.
 """
 
 import hashlib
@@ -19,74 +19,63 @@ from numpy.typing import NDArray
 
 from uuv_marl.atomic import replacing
 from uuv_marl.baselines.learned.layers import Architecture, Sizes, shapes
-from uuv_marl.baselines.policy import Policy, PolicyError
+from uuv_marl.baselines.requirements import FULL_TORQUE_NM, PolicyRequirements
+from uuv_marl.errors import PolicyError
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
-from uuv_marl.scenario.hardware import Actuators, Vehicle
+from uuv_marl.scenario.messages import explain
 from uuv_marl.sim.observation import observation_layout
 from uuv_marl.types import Float32
 
 Row = tuple[str, int, str, float]
 
-WEIGHTS_FILE = "policy.safetensors"
-"""The checkpoint within a folder."""
+WEIGHTS_FILE = "policy.safetensors"  # the checkpoint within a folder
 _SHIPPED = Path(__file__).parents[1] / "weights"
 _CARD = "uuv_marl"
-_MOST_WEIGHT = 1e6
-"""Larger weights are no result of training, and overflow in single precision."""
+_MOST_WEIGHT = 1e6  # largest valid weight; larger ones overflow in single precision
 _NOT_THE_VEHICLE = {
-    "vehicle.name",
-    "vehicle.length_m",
-    "vehicle.cruise_mps",
-    "vehicle.max_mps",
-    "vehicle.source",
-    "actuators.yaw_damping_nms",
-    "actuators.thrust_lag_s",
-    "actuators.yaw_lag_s",
-    "actuators.yaw_authority",
-}
+    "vehicle.name", "vehicle.length_m", "vehicle.cruise_mps", "vehicle.max_mps", "vehicle.source",
+    "actuators.yaw_damping_nms", "actuators.thrust_lag_s", "actuators.yaw_lag_s", "actuators.yaw_authority",
+}  # fmt: skip
 
 
 def vehicle_of(scenario: Scenario) -> dict[str, float | str]:
-    """Hull and actuators of a scenario, by field; without the inner loop, which policies declare, and disturbances.
+    """Hull and actuators of a scenario, by field; without the inner loop, which policies require, and disturbances.
 
-    A field that a vehicle's file may leave out is included only if it differs from its default: checkpoints of hulls
-    without lift and rudder do not mention lift and rudder.
+    An optional field of a vehicle's file is included only if it differs from its default: checkpoints of hulls without
+    lift and rudder do not mention them.
     """
-    sections = {"vehicle": scenario.vehicle.model_dump(), "actuators": scenario.actuators.model_dump()}
-    usual = {
-        f"{section}.{name}": field.default
-        for section, model in (("vehicle", Vehicle), ("actuators", Actuators))
-        for name, field in model.model_fields.items()
-        if not field.is_required()
+    sections = {"vehicle": scenario.vehicle, "actuators": scenario.actuators}
+    fields = {
+        f"{section}.{name}": value
+        for section, model in sections.items()
+        for name, value in model.model_dump(exclude_defaults=True).items()
     }
-    every = {f"{section}.{name}": value for section, own in sections.items() for name, value in own.items()}
-    fields = {field: value for field, value in every.items() if field not in usual or value != usual[field]}
     return {field: value for field, value in fields.items() if field not in _NOT_THE_VEHICLE}
 
 
 class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
-    """Facts about a policy and its training, in the header of its checkpoint."""
+    """Description of a policy and its training, in the header of its checkpoint."""
 
     format: Literal[1] = 1
     network: Architecture = Architecture()
-    """What the network is made of."""
+    """Architecture of the network."""
     filter: bool = False
-    """Whether its actions pass the safety filter."""
+    """Whether the safety filter changes its actions."""
     base_controller: str = ""
-    """Name of the law to whose actions its own are added, if any."""
+    """Name of the controller to whose actions the network's are added, if any."""
     percept: tuple[Row, ...]
-    """Name, size, unit and scale of every row of the observation as ``closeness``, which the network is given."""
+    """Name, size, unit and scale of every row of the observation as ``closeness``, the network's input."""
     decision_period_s: pydantic.PositiveFloat
-    """Between decisions, in training as in use [s]."""
+    """Decision period, in training as in use [s]."""
     yaw_damping_nms: float
-    """Inner loop that it was trained with [N m s]."""
+    """Inner loop of the training [N m s]."""
     channels: tuple[str, ...] = ()
     """Channels beyond the percept."""
     vehicle: dict[str, float | str]
-    """Hull and actuators that it was trained on, by field of the scenario."""
+    """Hull and actuators of the training, by field of the scenario."""
     training: dict[str, Any] = {}
-    """How it came about: settings, versions, agent-steps, validation."""
+    """Origin: settings, versions, agent-steps, validation."""
 
     @property
     def sizes(self) -> Sizes:
@@ -95,24 +84,23 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
 
     @property
     def policy_class(self) -> str:
-        """What decides beside the network: nothing, the filter, a law."""
+        """What acts besides the network: nothing, the safety filter, a base controller."""
         if self.base_controller:
             return "residual"
         return "end to end + filter" if self.filter else "end to end"
 
     @property
-    def full_torque_nm(self) -> float:
-        """Full torque of that vehicle [N m]."""
-        return float(self.vehicle.get("actuators.max_torque_nm", Policy.full_torque_nm))
-
-    @property
-    def outputs_force(self) -> bool:
-        """Whether its actions are forces: where that vehicle has no rudder."""
-        return self.vehicle.get("actuators.kind") != "rudder"
+    def requirements(self) -> PolicyRequirements:
+        """Channels, inner loop and decision period of the training; outputs are forces unless it had a rudder."""
+        torque = float(self.vehicle.get("actuators.max_torque_nm", FULL_TORQUE_NM))
+        force = self.vehicle.get("actuators.kind") != "rudder"
+        return PolicyRequirements(
+            self.channels, self.yaw_damping_nms, torque, self.decision_period_s, outputs_force=force
+        )
 
 
 class Checkpoint(NamedTuple):
-    """A file's content."""
+    """Content of a file."""
 
     card: Card
     tensors: Mapping[str, Float32]
@@ -122,13 +110,13 @@ class Checkpoint(NamedTuple):
 
 
 def card_rows(scenario: Scenario) -> tuple[Row, ...]:
-    """What a network is given in a scenario, as a card keeps it."""
+    """Rows of a network's input in a scenario, as in ``Card.percept``."""
     table = observation_layout(scenario, "closeness").table
-    return tuple((field.name, field.size, field.kind.unit, field.kind.scale) for field in table)
+    return tuple((field.name, field.size, field.quantity.unit, field.quantity.scale) for field in table)
 
 
 def card_of(scenario: Scenario, **more: Any) -> Card:
-    """The card of a network that was trained on a scenario; ``more`` are its other fields."""
+    """The card of a network trained on a scenario; ``more`` are its other fields."""
     return Card(
         percept=card_rows(scenario), decision_period_s=scenario.timing.decision_period_s,
         yaw_damping_nms=scenario.actuators.yaw_damping_nms, channels=scenario.sonar.channels,
@@ -137,12 +125,12 @@ def card_of(scenario: Scenario, **more: Any) -> Card:
 
 
 def is_checkpoint(name: str) -> bool:
-    """Whether a policy's name means a file or folder."""
+    """Whether a policy's name is a file or folder."""
     return "/" in name or os.sep in name or (":" not in name and user_path(name).exists())
 
 
 def save_checkpoint(path: UserPath, card: Card, tensors: Mapping[str, NDArray[Any]]) -> None:
-    """Write a checkpoint file, whole or not at all; ``tensors`` by name, as ``layers.shapes`` has them."""
+    """Write a checkpoint file atomically; ``tensors`` by name, as in ``layers.shapes``."""
     path = user_path(path)
     contiguous = {name: np.ascontiguousarray(array, np.float32) for name, array in tensors.items()}
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -153,8 +141,7 @@ def save_checkpoint(path: UserPath, card: Card, tensors: Mapping[str, NDArray[An
 def load_checkpoint(path: UserPath) -> Checkpoint:
     """A checkpoint from its file, from the folder that holds it, or by the name of a network that ships.
 
-    Raises:
-        PolicyError: there is none, or it can't be used; the message names what is wrong.
+    Raises PolicyError if it is missing or invalid.
     """
     shipped = _SHIPPED / f"{path}.safetensors"
     path = shipped if isinstance(path, str) and path.isidentifier() and shipped.is_file() else user_path(path)
@@ -181,16 +168,14 @@ def load_checkpoint(path: UserPath) -> Checkpoint:
 
 
 def _reason(error: Exception) -> str:
-    """What is wrong with a checkpoint, in a line."""
+    """The first problem of a checkpoint, in a line."""
     if isinstance(error, pydantic.ValidationError):
-        first = error.errors()[0]
-        field = ".".join(map(str, first["loc"]))
-        return f"its card's {field}: {first['msg']}" if field else "it has no card"
+        return f"its card's {explain(error, None, Card)}" if error.errors()[0]["loc"] else "it has no card"
     return f"{error.args[0]} is missing" if isinstance(error, KeyError) else str(error)
 
 
 def _check(checkpoint: Checkpoint) -> None:
-    """Raises ValueError that names what can't be run."""
+    """Raise ValueError if weights are missing, not finite, or of another shape than the card's."""
     card, tensors = checkpoint.card, checkpoint.tensors
     for name, shape in shapes(card.network, card.sizes).items():
         array = tensors[name]

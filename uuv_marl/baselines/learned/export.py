@@ -1,8 +1,9 @@
-"""Networks as ONNX models: from an observation, and the memory's state where there is one, to an action.
+"""Networks as ONNX models: from an observation, and the state of a recurrent layer, to an action.
 
-The nodes are made by the lines that NumPy runs, ``layers.Network``.
+The nodes are created by the code that NumPy runs, ``layers.Network``.
 """
 
+import functools
 import json
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.actor import Actor, in_disc
 from uuv_marl.baselines.learned.layers import Network
 from uuv_marl.baselines.policy import PolicyError
@@ -25,15 +26,14 @@ with extra("onnx", "export to ONNX"):
     import onnx
     from onnx import TensorProto, helper, numpy_helper
 
-OPSET = 18
-"""Version of ONNX's operators: the first that has every operator in its present form."""
+OPSET = 18  # version of ONNX's operators: the first that has every operator in its present form
 
 
 def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
     """Write a network as an ONNX model that maps observations (vehicle, size) to actions (vehicle, 2), float32.
 
-    Observations are those of an environment with ``observe="closeness"``. A network with a memory also takes its state
-    (vehicle, unit), zeros at first, and gives the next one.
+    Observations are those of an environment with ``observe="closeness"``. A recurrent network also takes its state
+    (vehicle, unit), zeros at first, and returns the next one.
 
     Args:
         policy: name of a network, or path of a checkpoint.
@@ -41,16 +41,16 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
         path: the file.
 
     Raises:
-        PolicyError: the policy is no such network, or was trained on another percept or vehicle than the scenario has.
+        PolicyError: the policy is not such a network, or was trained on another percept or vehicle than the scenario's.
         ResultsError: the file can't be written.
     """
     path = user_path(path)
-    actor = make(policy, with_policy_requirements(policy, scenario))
+    actor = make_policy(policy, with_policy_requirements(policy, scenario))
     if not isinstance(actor, Actor):
         raise PolicyError(
-            f"policy {policy!r} can't be exported: ONNX holds networks end to end, not laws, filters, or networks "
-            "around a law. Export a checkpoint of a training without filter and law; run this "
-            "policy with uuv_marl.baselines.make"
+            f"policy {policy!r} can't be exported: ONNX holds networks end to end, not controllers, safety filters or "
+            "residual networks. Export a checkpoint of a training without filter and base controller; run this "
+            "policy with uuv_marl.baselines.make_policy"
         )
     graph = Graph()
     network = Network(actor.checkpoint.card.network, actor.checkpoint.card.sizes, actor.checkpoint.tensors, graph)
@@ -68,17 +68,17 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
 
 
 def _model(policy: Actor, graph: "Graph") -> onnx.ModelProto:
-    """The model with its documentation; its metadata hold the vehicle's limits, and card and digest of the weights."""
+    """The model with its documentation; metadata hold the vehicle's limits, the card, and the digest of the weights."""
     layout, checkpoint = observation_layout(policy.scenario, "closeness"), policy.checkpoint
-    units = [f"{row.kind.scale:g} {row.kind.unit}".removesuffix(" 1") for row in layout.table]
+    units = [f"{row.quantity.scale:g} {row.quantity.unit}".removesuffix(" 1") for row in layout.table]
     fields = ", ".join(f"{row.name} {row.size} [{unit}]" for row, unit in zip(layout.table, units, strict=True))
     sees = f"As closeness, body frame; name, size and unit of each part: {fields}."
     acts = "Surge force and yaw torque [full force, full torque], within the unit disc."
     takes, gives = [_tensor("observation", layout.size, sees)], [_tensor("action", 2, acts)]
     if checkpoint.card.network.memory:
         units_of = checkpoint.card.network.hidden[-1]
-        takes.append(_tensor("state", units_of, "What was remembered; zeros at an episode's start."))
-        gives.append(_tensor("next_state", units_of, "What is remembered."))
+        takes.append(_tensor("state", units_of, "State of the recurrent layer; zeros at an episode's start."))
+        gives.append(_tensor("next_state", units_of, "Next state of the recurrent layer."))
     damping, period = policy.scenario.actuators.yaw_damping_nms, checkpoint.card.decision_period_s
     opset = [helper.make_opsetid("", OPSET)]
     model = helper.make_model(
@@ -100,22 +100,16 @@ def _tensor(name: str, size: int, description: str) -> onnx.ValueInfoProto:
 
 
 class Graph:
-    """Nodes and constants, in the order in which formulas make them: the operations of a ``layers.Network``."""
+    """Nodes and constants, in the order of creation: the operations of a ``layers.Network``."""
 
     def __init__(self) -> None:
         self.nodes: list[onnx.NodeProto] = []
         self.constants: list[onnx.TensorProto] = []
         self._named = 0
+        self.tanh, self.sigmoid, self.relu = (functools.partial(self, name) for name in ("Tanh", "Sigmoid", "Relu"))
 
     def __call__(self, operator: str, *inputs: Any, name: str = "", **attributes: Any) -> "Value":
-        """The output of a new node.
-
-        Args:
-            operator: of ONNX.
-            inputs: values, or arrays, which become constants.
-            name: of the output; made up where empty.
-            attributes: of the operator.
-        """
+        """The output of a new node with an operator's inputs (values, or arrays as constants), name and attributes."""
         name = name or self.fresh(operator)
         values = [each if isinstance(each, Value) else self.constant(each) for each in inputs]
         self.nodes.append(helper.make_node(operator, [value.name for value in values], [name], name, **attributes))
@@ -130,7 +124,7 @@ class Graph:
         return self("Gather", x, columns, axis=1)
 
     def shaped(self, x: "Value", shape: Sequence[int]) -> "Value":
-        """With -1 for an axis that follows from the others."""
+        """The tensor in another shape; -1 for an axis that follows from the others."""
         return self("Reshape", x, np.array(shape, np.int64))
 
     def joined(self, parts: "Sequence[Value]") -> "Value":
@@ -143,36 +137,24 @@ class Graph:
         self.nodes.append(helper.make_node("Split", [x.name], names, self.fresh("Split"), axis=1, num_outputs=3))
         return [Value(self, name) for name in names]
 
-    def tanh(self, x: "Value") -> "Value":
-        """From -1 to 1."""
-        return self("Tanh", x)
-
-    def sigmoid(self, x: "Value") -> "Value":
-        """From 0 to 1."""
-        return self("Sigmoid", x)
-
-    def relu(self, x: "Value") -> "Value":
-        """At least 0."""
-        return self("Relu", x)
-
     def total(self, x: "Value") -> "Value":
-        """Sum over the middle axis, which goes."""
+        """Sum over the middle axis, which is removed."""
         return self("ReduceSum", x, np.array([1]), keepdims=0)
 
     def fresh(self, stem: str) -> str:
-        """A name that nothing has."""
+        """An unused name."""
         self._named += 1
         return f"{stem}_{self._named}"
 
     def constant(self, value: Any) -> "Value":
-        """An array."""
+        """An array as a constant."""
         name = self.fresh("constant")
         self.constants.append(numpy_helper.from_array(np.asarray(value), name))
         return Value(self, name)
 
 
 class Value:
-    """A tensor of a graph; formulas of it add nodes."""
+    """A tensor of a graph; arithmetic on it adds nodes."""
 
     def __init__(self, graph: Graph, name: str) -> None:
         self.graph, self.name = graph, name

@@ -1,4 +1,4 @@
-"""The networks of learned policies, written once: NumPy, torch and ONNX run the same lines, each by its operations."""
+"""The networks of learned policies, written once: NumPy, torch and ONNX run the same code, each with its operations."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
@@ -9,34 +9,31 @@ import pydantic
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Float32, Int64
 
-ENCODED = 32
-"""Units that describe a sub-sector."""
+ENCODED = 32  # features of an encoded sub-sector
 _HEARD = (
     "closeness", "neighbour_direction", "link_identity", "link_velocity", "age", "ranged", "modem_identity",
     "modem_velocity", "modem_age",
 )  # fmt: skip
 _ECHO = ("echo_closeness", "echo_direction")
-_POWERS = 4
-"""Sums of a kind in ``moments``: of directions, whose length is closeness, times its powers 0, 1, 2 and 4."""
-Sizes = Sequence[tuple[str, int]]
-"""Name and entries of every row of an observation, in order."""
+_POWERS = 4  # sums of a kind in ``moments``: directions, whose length is closeness, times its powers 0, 1, 2 and 4
+Sizes = Sequence[tuple[str, int]]  # name and number of entries of every row of an observation, in order
 
 
 class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
-    """What a network is made of."""
+    """Architecture of a network."""
 
     kind: Literal["mlp", "sectors", "moments"] = "mlp"
-    """How it reads an observation: ``mlp``, as it is; ``sectors``, by one encoder that all sub-sectors share, and the
-    sum over them; ``moments``, as it is and by sums over all sub-sectors of direction times a power of closeness, which
-    tell a memory how neighbours move, whatever sub-sectors they pass."""
+    """Input layer: ``mlp``, the observation; ``sectors``, one encoder shared by all sub-sectors, and the sum over them;
+    ``moments``, the observation and sums over all sub-sectors of direction times a power of closeness, which show a
+    memory how neighbours move through sub-sectors."""
     memory: bool = False
-    """Whether a recurrent layer (GRU) stands between; what follows sees its state beside what it saw."""
+    """Whether a recurrent layer (GRU) precedes the hidden layers, which take its state beside its input."""
     hidden: Annotated[tuple[pydantic.PositiveInt, ...], pydantic.Field(min_length=1)] = (64, 64)
-    """Units of the layers, tanh; those of the recurrent layer as of the last."""
+    """Units of the tanh layers; the recurrent layer has as many as the last."""
 
 
 def columns(sizes: Sizes) -> tuple[dict[str, Int64], Int64]:
-    """Where sub-sectors' entries are, shape (sub-sector, entry), ``heard`` and ``echo``; and all others."""
+    """Columns of sub-sectors' entries, shape (sub-sector, entry), for ``heard`` and ``echo``; and all others."""
     at: dict[str, Int64] = {}
     sectors: dict[str, Int64] = {}
     first = 0
@@ -76,11 +73,10 @@ class Network:
     """A network on rows of observations.
 
     Args:
-        made: what it is made of.
+        architecture: kind of input, memory and layers.
         sizes: rows of an observation.
-        tensors: by name, as ``shapes`` has them.
-        ops: operations on these tensors: ``dense``, ``take``, ``shaped``, ``joined``, ``parts``, ``tanh``, ``sigmoid``,
-            ``relu``, and ``total`` over the middle axis; see ``NumpyOps``.
+        tensors: by name, as in ``shapes``.
+        ops: operations on these tensors, see ``NumpyOps``.
     """
 
     def __init__(self, architecture: Architecture, sizes: Sizes, tensors: Mapping[str, Any], ops: Any) -> None:
@@ -88,7 +84,7 @@ class Network:
         self._sectors, self._rest = columns(sizes)
 
     def features(self, x: Any) -> Any:
-        """What the layers see of observations (row, entry): the same, also with moments, or sub-sectors encoded."""
+        """Features of observations (row, entry): unchanged, with moments, or with sub-sectors encoded."""
         if self.architecture.kind == "mlp":
             return x
         if self.architecture.kind == "moments":
@@ -99,11 +95,11 @@ class Network:
             seen = ops.shaped(ops.take(x, entries.reshape(-1)), (-1, size))
             code = ops.shaped(ops.dense(seen, self._tensors[f"{kind}.weight"]), (-1, num, ENCODED))
             place = self._tensors[f"{kind}.place"]
-            parts.append(ops.total(ops.relu(code + place) - ops.relu(place)))  # 0 where nothing is heard
+            parts.append(ops.total(ops.relu(code + place) - ops.relu(place)))  # 0 where nothing is detected
         return ops.joined(parts)
 
     def _moments(self, x: Any) -> Iterator[Any]:
-        """Sums over the sub-sectors that hear neighbours, and over those that hear echoes, shape (row, 2) each."""
+        """Sums over the sub-sectors that detect neighbours, and over those with echoes, shape (row, 2) each."""
         ops = self._ops
         for entries in self._sectors.values():
             near = ops.shaped(ops.take(x, entries[:, 0]), (-1, len(entries), 1))
@@ -115,11 +111,11 @@ class Network:
             )
 
     def gates(self, z: Any) -> Any:
-        """What features (row, entry) tell the recurrent layer, shape (row, 3 x unit)."""
+        """Input of the recurrent layer's gates from features (row, entry), shape (row, 3 x unit)."""
         return self._ops.dense(z, self._tensors["gru.weight"], self._tensors["gru.bias"])
 
     def step(self, gates: Any, state: Any) -> Any:
-        """The recurrent layer's next state, shape (row, unit). Cho et al. 2014, as torch has it."""
+        """Next state of the recurrent layer, shape (row, unit). Cho et al. 2014, in torch's form."""
         ops = self._ops
         own = ops.dense(state, self._tensors["gru.state_weight"], self._tensors["gru.state_bias"])
         (r, k, n), (own_r, own_k, own_n) = ops.parts(gates), ops.parts(own)
@@ -128,7 +124,7 @@ class Network:
         return new + weighted_state * (state - new)
 
     def output(self, z: Any, state: Any = None) -> Any:
-        """The action before its bounds, shape (row, 2), of features and the recurrent layer's state, if any."""
+        """The action before its bounds, shape (row, 2), from features and the recurrent layer's state, if any."""
         x, last = z if state is None else self._ops.joined([z, state]), len(self.architecture.hidden)
         for k in range(last + 1):
             x = self._ops.dense(x, self._tensors[f"{k}.weight"], self._tensors[f"{k}.bias"])
@@ -137,14 +133,14 @@ class Network:
 
 
 class NumpyOps:
-    """Operations on arrays. A row's result does not depend on the rows beside it, which no BLAS library promises."""
+    """Operations on arrays. A row's result does not depend on other rows, which no BLAS library guarantees."""
 
     tanh = staticmethod(np.tanh)
     shaped = staticmethod(np.reshape)
 
     @staticmethod
     def dense(x: Float32, weight: Float32, bias: Float32 | None = None) -> Float32:
-        """A layer without its activation: (row, out) for (row, in)."""
+        """A linear layer: (row, out) for (row, in)."""
         out: Float32 = np.empty((len(x), weight.shape[1]), np.float32)
         dense(x, weight, np.zeros_like(weight[0]) if bias is None else bias, out)
         return out
@@ -166,12 +162,12 @@ class NumpyOps:
 
     @staticmethod
     def sigmoid(x: Float32) -> Float32:
-        """From 0 to 1."""
+        """Logistic function."""
         return np.float32(0.5) + np.float32(0.5) * np.tanh(np.float32(0.5) * x)
 
     @staticmethod
     def relu(x: Float32) -> Float32:
-        """At least 0."""
+        """Rectifier."""
         return np.maximum(x, np.float32(0.0))
 
     @staticmethod
@@ -182,15 +178,12 @@ class NumpyOps:
 
 @compiled
 def dense(x: Float32, weight: Float32, bias: Float32, out: Float32) -> None:
-    """A layer without its activation.
-
-    ``x`` (row, in), ``weight`` (in, out), ``bias`` (out,); ``out`` (row, out) is filled.
-    """
+    """A linear layer: ``x`` (row, in), ``weight`` (in, out), ``bias`` (out,); fills ``out`` (row, out)."""
     for i in range(x.shape[0]):
         for k in range(out.shape[1]):
             out[i, k] = bias[k]
         for j in range(x.shape[1]):
             value = x[i, j]
-            if value != 0.0:  # most sub-sectors hear nobody
+            if value != 0.0:  # most sub-sectors are empty
                 for k in range(out.shape[1]):
                     out[i, k] += value * weight[j, k]

@@ -1,4 +1,4 @@
-"""A network around a law: the law acts, and the network adds a bounded part to what it does."""
+"""A residual network: a base controller acts, and the network adds a bounded part to its actions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,22 +13,21 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike
 from uuv_marl.types import Float32
 
-SHARE = 0.5
-"""How much of the full force a network may add to a law's action."""
+SHARE = 0.5  # largest part of the full force that a network adds to the base controller's action
 
 
 class ResidualPolicy(Policy):
-    """A law's actions, to which those of another policy are added.
+    """Actions of a base controller plus those of another policy.
 
     Args:
-        law: whose channels and inner loop the other policy has too.
+        base: the base controller, whose channels and inner loop the other policy has too.
         inner: the other policy, made for the same scenario and worlds.
     """
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, base: Policy, inner: Policy) -> None:
         self.base, self.inner = base, inner
         self.name = inner.name
-        self.copy_requirements(base)
+        self.requirements = base.requirements
         super().__init__(scenario, num_worlds)
 
     def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
@@ -50,17 +49,17 @@ class ResidualPolicy(Policy):
         return action
 
     def record_action(self, action: Float32) -> None:
-        """Both are told."""
+        """Report the actions to both."""
         super().record_action(action)
         for each in (self.base, self.inner):
             each.record_action(action)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """Those of both, too."""
+        """Snapshots of both."""
         return super().snapshot() | parts_of(base=self.base, inner=self.inner)
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Both, too."""
+        """Restore both."""
         super().restore(snapshot)
         self.base.restore(part_of(snapshot, "base"))
         self.inner.restore(part_of(snapshot, "inner"))

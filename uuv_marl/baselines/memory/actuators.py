@@ -1,14 +1,14 @@
-"""How a vehicle's actuators answer, as it identifies it from its own motion, and what to ask for to make up for it.
+"""Response of a vehicle's actuators, identified from its own motion, and the demand that compensates it.
 
-A component is thrust, or torque with the inner loop's. It follows what is asked, g, with a lag T, and a share s of it
-comes: F' = (s g - F) / T, all as shares of full thrust or torque. With e = exp(-period / T), and m for the mean of
-exp(-t / T) over a period, the means f of F over two periods that follow one another obey
+A component is thrust, or torque with the inner loop's. It follows the demand g with a lag T and an effectiveness s: F'
+= (s g - F) / T, all as shares of full thrust or torque. With e = exp(-period / T), and m for the mean of exp(-t / T)
+over a period, the means f of F over consecutive periods obey
 
     f_k = e f_(k-1) + s (1 - m) g_k + s (m - e) g_(k-1).
 
 The three coefficients follow from recursive least squares with exponential forgetting (Ljung, System identification,
-1999, section 11.2) on what changes from one decision to the next, so that what is constant (a current, drag that is
-off) does not count. A regularization keeps them at those of actuators that answer at once, unless more is seen.
+1999, section 11.2) on changes between decisions, so that constant effects (a current, a drag error) cancel. A
+regularization keeps them at those of ideal actuators until the motion shows otherwise.
 """
 
 import math
@@ -19,25 +19,23 @@ from uuv_marl.sim.compiled import compiled
 ASKED, ACTED, ASKED_BEFORE, ACTED_BEFORE, SQUARES, PRODUCTS = 0, 1, 2, 3, 4, 10
 """Columns of ``Surroundings.actuators``: g and f of the latest period and of that before, six sums of products of the
 regressors (f_(k-1), g_k, g_(k-1)), and three of the regressors with f_k - g_k."""
-_KEPT_S = 5.0
-"""Time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg."""
+_KEPT_S = 5.0  # time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg.
 _NOTHING = 1e-3
-"""Squared changes, summed, that are too small to say anything: one of 3 % of full thrust or torque."""
+"""Sum of squared changes below which the estimate stays at ideal actuators (3 % of full thrust or torque)."""
 _LONGEST = 0.97
-"""Bound of e. Assumed: a lag of 3 s at a decision every 0.1 s, which no actuator of the catalogue has."""
+"""Largest e. Assumed: a lag of 3 s at a decision every 0.1 s, more than any actuator of the catalogue has."""
 _MISSING = 0.3
-"""Where so much of what is asked does not come at once, the correction counts fully [1]. Assumed: nothing is missing in
-a current (0.97 to 1.05 come at once, on a tuning field), and 0.63 with a lag of 0.1 s."""
-_LEAST, _MOST = 0.05, 1.5
-"""Bounds of s. Assumed: what is as weak as 5 % can't be made up for."""
+"""Immediate shortfall at which the correction has full weight [1]. Assumed: in a current 0.97 to 1.05 of a demand acts
+at once, on a tuning field, and 0.63 with a lag of 0.1 s."""
+_LEAST, _MOST = 0.05, 1.5  # bounds of s. Assumed: an effectiveness of 5 % can't be compensated.
 
 
 @compiled
 def identify(w: int, i: int, axis: int, asked: float, off: float, period: float, memory: Surroundings) -> None:
-    """Take what one period showed of a component into the estimate.
+    """Update the estimate of a component with one period.
 
-    ``asked`` is the share with the inner loop's, ``off`` by how much more the motion shows, as a share of full thrust
-    or torque.
+    ``asked`` is the demand including the inner loop's, ``off`` the excess of the measured motion over the model's, both
+    as shares of full thrust or torque.
     """
     at = memory.actuators[w, i, axis]
     f, g, h = at[ACTED] - at[ACTED_BEFORE], asked - at[ASKED], at[ASKED] - at[ASKED_BEFORE]
@@ -58,10 +56,7 @@ def identify(w: int, i: int, axis: int, asked: float, off: float, period: float,
 
 @compiled
 def answer(w: int, i: int, axis: int, memory: Surroundings) -> tuple[float, float, float]:
-    """What remains of a difference after a period, e; the share of what is asked that comes, s, and that comes at once.
-
-    They are 0, 1 and 1 at first.
-    """
+    """Remaining share of a difference after a period, effectiveness, and its immediate part: at first 0, 1 and 1."""
     at = memory.actuators[w, i, axis]
     d_0 = at[SQUARES] + _NOTHING  # L D L' of the sums
     l_1, l_2 = at[SQUARES + 1] / d_0, at[SQUARES + 2] / d_0
@@ -80,11 +75,10 @@ def answer(w: int, i: int, axis: int, memory: Surroundings) -> tuple[float, floa
 
 @compiled
 def lead(w: int, i: int, axis: int, wanted: float, share: float, memory: Surroundings) -> float:
-    """What to ask of a component so that what is wanted acts at the end of the period: the answer, inverted.
+    """Demand on a component so that ``wanted`` acts at the end of the period: the response, inverted.
 
-    It counts as far as less than all comes at once. Where all does, a slowly changing current looks like a lag.
-    ``wanted`` is a share with the inner loop's. Of the change ``share`` is made: 0 asks for what is wanted, 1 for what
-    makes up for lag and weakness.
+    The correction is weighted by the immediate shortfall, since a slowly changing current looks like a lag. ``wanted``
+    is a share including the inner loop's; ``share`` is the part of the correction that is applied, from 0 to 1.
     """
     at = memory.actuators[w, i, axis]
     e, s, at_once = answer(w, i, axis, memory)

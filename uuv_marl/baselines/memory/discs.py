@@ -1,7 +1,7 @@
-"""Obstacles that a vehicle has heard, as discs in its own map: a recursive least-squares estimate of centre and radius.
+"""Detected obstacles as discs in a vehicle's map: recursive least-squares estimates of centre and radius.
 
-Each echo is a point of a disc's surface; where echoes report centres, it also gives the centre. A disc that should be
-heard and is not, decision after decision, is forgotten.
+Each echo is a point of a disc's surface; where echoes report centres, it also gives the centre. A disc that repeatedly
+remains undetected where it should be detected is removed.
 """
 
 import math
@@ -9,53 +9,42 @@ from typing import NamedTuple
 
 from uuv_marl.baselines.memory.pose import to_body, to_map, to_map_axes
 from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.percept import Fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.sonar import cross, suite
-from uuv_marl.sim.views import Fields
 from uuv_marl.types import Float64
 
 NOISE_M, NOISE_SHARE = 0.05, 0.03
-"""Standard deviation of an echo: so much, and this share of its range. Assumed: noise of 2 % and of 1 degree."""
+"""Standard deviation of an echo: constant [m], and share of its range. Assumed: noise of 2 % and of 1 degree."""
 RADIUS_M, RADIUS_SD_M = 18.0, 10.0
-"""Radius expected of an obstacle of which one point is known, and its deviation [m]. Assumed: those of random_field."""
+"""Expected radius of an obstacle with one known point, and its deviation [m]. Assumed: those of random_field."""
 SIDE_SD_M = 8.0
-"""Deviation across of the centre of an obstacle whose nearest point may lie outside the sonar's arc [m]. Assumed."""
-GATE = 3.0
-"""Deviations by which an echo may miss a disc that it belongs to [1]."""
-CONFIRMED = 3.0
-"""Decisions at which a disc must have been heard to count."""
+"""Lateral deviation of the centre of an obstacle whose nearest point may lie outside the sonar's arc [m]. Assumed."""
+GATE = 3.0  # largest deviation of an echo from its disc, in standard deviations [1]
+CONFIRMED = 3.0  # detections from which a disc counts
 MOST_SCORE_S = 3.0
-"""One that was heard for so long is kept until it should have been heard for so long and was not [s]. Assumed."""
-LIFETIME = 40.0
-"""One that was heard for t seconds in all, less than that, is forgotten after this times t^2 [1/s]. Assumed."""
-SMALLEST_M, LARGEST_M = 0.5, 60.0
-"""Bounds of a radius [m]."""
-_FORGETS = 0.2
-"""Growth of the covariance of a disc that is heard [1/s]: about the last 5 s count ..."""
+"""Largest score, as time [s]: the time for which a disc then remains undetected until it is removed. Assumed."""
+LIFETIME = 40.0  # a disc detected for t seconds in all, less than that, is removed after this times t^2 [1/s]. Assumed.
+SMALLEST_M, LARGEST_M = 0.5, 60.0  # bounds of a radius [m]
+_FORGETS = 0.2  # growth of the covariance of a detected disc [1/s]: about the last 5 s count ...
 _MOST_VARIANCE = 2.0 * RADIUS_SD_M * RADIUS_SD_M + SIDE_SD_M * SIDE_SD_M
 """... unless it is as large as that of a new one already [m2]."""
 
 
 class ActiveSectors(NamedTuple):
-    """The active sub-sectors, and what they report."""
+    """Active sub-sectors and their reports."""
 
-    lower: Float64
-    """Lower edge of each, a unit vector, shape (active, 2)."""
-    upper: Float64
-    """Upper edge of each, shape (active, 2)."""
-    range_m: Float64
-    """How far each hears, shape (active,) [m]."""
-    centres: bool
-    """Echoes report centres; else points of surfaces."""
-    period_s: float
-    """Between two decisions [s]."""
-    most_score: float
-    """Decisions that stand for ``MOST_SCORE_S``, at least twice ``CONFIRMED``."""
+    lower: Float64  # unit vectors of lower edges, shape (active, 2)
+    upper: Float64  # unit vectors of upper edges, shape (active, 2)
+    range_m: Float64  # shape (active,)
+    centres: bool  # whether echoes report centres, else points of surfaces
+    period_s: float  # decision period [s]
+    most_score: float  # decisions in ``MOST_SCORE_S``, at least twice ``CONFIRMED``
 
     @staticmethod
     def of(scenario: Scenario) -> "ActiveSectors":
-        """Those of a scenario's sonar."""
+        """Sub-sectors of a scenario's sonar."""
         all_of, period = suite(scenario), scenario.timing.decision_period_s
         return ActiveSectors(
             all_of.lower[all_of.active], all_of.upper[all_of.active], all_of.active_range,
@@ -71,14 +60,14 @@ def deviation(reach: float) -> float:
 
 @compiled
 def contains(a: int, x: float, y: float, sectors: ActiveSectors) -> bool:
-    """Whether a direction, ahead and to starboard, lies in an active sub-sector."""
+    """Whether a direction (ahead, starboard) lies in an active sub-sector."""
     lower, upper = sectors.lower, sectors.upper
     return cross(lower[a, 0], lower[a, 1], x, y) > 0.0 and cross(upper[a, 0], upper[a, 1], x, y) <= 0.0
 
 
 @compiled
 def update_discs(w: int, i: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> None:
-    """Take a vehicle's echoes into its discs, and forget those that should have been heard and were not."""
+    """Update a vehicle's discs with its echoes, and remove those that are repeatedly undetected."""
     undetected = memory.undetected[w, i]
     for d in range(undetected.shape[0]):
         undetected[d] += sectors.period_s
@@ -102,7 +91,7 @@ def update_discs(w: int, i: int, see: Fields, sectors: ActiveSectors, memory: Su
 
 @compiled
 def _nearest_unexplained(w: int, i: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> int:
-    """The active sub-sector of the nearest echo that no disc explains, -1 for none. Arguments: ``update_discs``."""
+    """Active sub-sector of the nearest echo that no disc explains, -1 for none."""
     nearest, reach = -1, math.inf
     for a in range(see.echo.shape[2]):
         if (
@@ -116,10 +105,9 @@ def _nearest_unexplained(w: int, i: int, see: Fields, sectors: ActiveSectors, me
 
 @compiled
 def _explained(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> bool:
-    """Whether an echo belongs to a disc which, now that it is corrected, has the echo on its surface.
+    """Whether an echo belongs to a disc and lies on its surface after the disc's correction.
 
-    Two obstacles of which one point each is heard may be taken for one, until no disc fits both. Arguments as for
-    ``owner``.
+    Two obstacles with one detected point each may be taken for one, until no disc fits both.
     """
     d = owner(w, i, a, see, sectors, memory)
     if d < 0 or sectors.centres:
@@ -132,7 +120,7 @@ def _explained(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, memo
 
 @compiled
 def surface_point(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors) -> tuple[float, float]:
-    """The point of a surface that an echo comes from, in the body frame [m].
+    """Surface point of an echo in the body frame [m].
 
     Where echoes report centres it lies in the centre's direction, or on the edge of the sub-sector next to that.
     """
@@ -151,13 +139,13 @@ def surface_point(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors) -
 
 @compiled
 def centre_of(w: int, i: int, a: int, see: Fields, memory: Surroundings) -> tuple[float, float]:
-    """The centre that an echo reports, in the map [m]. Arguments as for ``owner``."""
+    """Centre that an echo reports, in the map [m]."""
     return to_map(float(see.echo_position[w, i, a, 0]), float(see.echo_position[w, i, a, 1]), memory.pose[w, i])
 
 
 @compiled
 def owner(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> int:
-    """The disc that an echo belongs to, -1 for none: the one whose surface it misses least."""
+    """Index of the disc that an echo belongs to, with the least distance from its surface; -1 for none."""
     x, y = surface_point(w, i, a, see, sectors)
     x, y = to_map(x, y, memory.pose[w, i])
     sd = deviation(float(see.echo_range[w, i, a]))
@@ -182,10 +170,10 @@ def owner(w: int, i: int, a: int, see: Fields, sectors: ActiveSectors, memory: S
 
 @compiled
 def correct(disc: Float64, p: Float64, h: tuple[float, float, float], wrong: float, variance: float) -> None:
-    """One step of recursive least squares: a measurement that is ``wrong`` by h . (x, y, R) corrects a disc.
+    """One step of recursive least squares with a measurement h . (x, y, R), in place.
 
-    ``disc`` holds centre and radius [m], ``p`` their covariance [m2]: xx, xy, xR, yy, yR, RR; both are corrected.
-    ``wrong`` is what was measured less what was expected [m], with its ``variance`` [m2].
+    ``disc``, shape (3,), holds centre and radius [m], ``p``, shape (6,), their covariance [m2]: xx, xy, xR, yy, yR, RR.
+    ``wrong`` is the measured less the expected value [m], with its ``variance`` [m2].
     """
     g_x = p[0] * h[0] + p[1] * h[1] + p[2] * h[2]
     g_y = p[1] * h[0] + p[3] * h[1] + p[4] * h[2]
@@ -200,7 +188,7 @@ def correct(disc: Float64, p: Float64, h: tuple[float, float, float], wrong: flo
 
 @compiled
 def _correct_centre(w: int, i: int, d: int, a: int, sd: float, see: Fields, memory: Surroundings) -> None:
-    """Correct a disc by the centre that an echo reports. ``sd``: standard deviation of the centre [m]."""
+    """Correct a disc by the centre that an echo reports. ``sd``: its standard deviation [m]."""
     disc, p = memory.disc[w, i, d], memory.spread[w, i, d]
     x, y = centre_of(w, i, a, see, memory)
     correct(disc, p, (1.0, 0.0, 0.0), x - disc[0], sd * sd)
@@ -209,7 +197,7 @@ def _correct_centre(w: int, i: int, d: int, a: int, sd: float, see: Fields, memo
 
 @compiled
 def _update_disc(w: int, i: int, d: int, a: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> None:
-    """Correct a disc by one echo. Arguments as for ``owner``; d is the index of the disc."""
+    """Correct disc d by one echo."""
     disc, p = memory.disc[w, i, d], memory.spread[w, i, d]
     if memory.undetected[w, i, d] > 0.0:  # the first of this decision
         memory.undetected[w, i, d] = 0.0
@@ -229,7 +217,7 @@ def _update_disc(w: int, i: int, d: int, a: int, see: Fields, sectors: ActiveSec
 
 @compiled
 def _begin(w: int, i: int, d: int, a: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> None:
-    """A new disc behind its nearest echo. Arguments as for ``owner``; d is the index of the disc."""
+    """Begin disc d behind its nearest echo."""
     x, y = surface_point(w, i, a, see, sectors)
     away = max(math.hypot(x, y), 1e-6)
     sd = deviation(away)
@@ -268,7 +256,7 @@ def _free_row(w: int, i: int, memory: Surroundings) -> int:
 
 @compiled
 def _lower_scores(w: int, i: int, see: Fields, sectors: ActiveSectors, memory: Surroundings) -> None:
-    """Lower the score of discs that should have been heard and were not. Arguments: ``update_discs``."""
+    """Lower the score of discs that are undetected where they should be detected."""
     for d in range(memory.score.shape[2]):
         score, undetected = memory.score[w, i, d], memory.undetected[w, i, d]
         if score <= 0.0 or undetected == 0.0:
@@ -289,9 +277,9 @@ def _lower_scores(w: int, i: int, see: Fields, sectors: ActiveSectors, memory: S
 
 @compiled
 def _merge(w: int, i: int, sectors: ActiveSectors, memory: Surroundings) -> None:
-    """Forget what overlaps a disc that is heard now and was heard less: half as often, or with its centre inside.
+    """Remove discs that overlap a detected disc of higher score: twice as high, or one centre inside the other.
 
-    Surfaces alone don't tell which of two that are heard now is wrong: both stay. Arguments as for ``update_discs``.
+    Surfaces alone do not show which of two detected discs is wrong: both stay.
     """
     disc, score = memory.disc[w, i], memory.score[w, i]
     for d in range(score.shape[0]):

@@ -1,42 +1,34 @@
-"""Neighbours that a vehicle hears, with velocities: an alpha-beta filter whose gains follow from the errors it sees."""
+"""Tracks of detected neighbours with velocities: an alpha-beta filter whose gains follow from observed errors."""
 
 import math
 
 from uuv_marl.baselines.memory.pose import to_map
 from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.percept import Fields
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields
 
 GATE_M, GATE_SHARE = 2.0, 0.1
-"""A reading this near to where a neighbour is expected is taken for it: so many metres, and a share of its range.
-
-Assumed."""
+"""Distance from a predicted position within which a reading is associated [m], plus a share of its range. Assumed."""
 ACCELERATION = 2.0
-"""A typical acceleration of neighbours [m/s2]. Assumed: a seventh of what full force makes of the default vehicle."""
+"""Typical acceleration of neighbours [m/s2]. Assumed: a seventh of the default vehicle's at full force."""
 MANOEUVRES = 0.005
-"""Mean error over range that neighbours' manoeuvres make; the rest is the sonar's [1]. Assumed."""
-LEAST_ERROR = 0.0002
-"""The sonar's is never taken for smaller than this [1]."""
-MEMORY_S = 1.0
-"""A neighbour that is heard no more is kept for so long where nothing else is said [s]."""
-_FRESH_S = 1.0
-"""Neighbours that were heard longer ago do not count in the mean age of readings [s]: they may have gone."""
-_SAME_M = 1e-3
-"""A reading that has not moved by this is the one before, of a sonar that reads more seldom than decisions are made."""
-_STALE_S = 2.0
-"""But it is believed to stand after so long [s]."""
+"""Mean error over range that neighbours' manoeuvres cause; the rest is attributed to the sonar [1]. Assumed."""
+LEAST_ERROR = 0.0002  # smallest assumed error of the sonar over range [1]
+MEMORY_S = 1.0  # default time for which an undetected neighbour is remembered [s]
+_FRESH_S = 1.0  # neighbours undetected for longer do not count in the mean age of readings [s]
+_SAME_M = 1e-3  # a reading that moved less is a repetition, from a sonar that is slower than decisions [m]
+_STALE_S = 2.0  # a repeated reading counts as new after this time [s]
 _FAR_M = 64.0
-"""In their mean place, neighbours farther than this count as if they were here, in the same direction. Assumed: about
-twice the radius in which 54 vehicles move."""
-_LEARNS = 0.05
-"""Weight of the newest error in their mean [1]."""
+"""Neighbours farther away count in the mean position as if they were at this distance. Assumed: about twice the radius
+in which 54 vehicles move."""
+_LEARNS = 0.05  # weight of the newest error in the running mean [1]
 
 
 @compiled
 def alpha_beta(period: float, deviation: float) -> tuple[float, float]:
-    """Alpha and beta [1] for the tracking index: ACCELERATION period^2 / deviation. Kalata 1984.
+    """Alpha and beta [1] for the tracking index ACCELERATION period^2 / deviation. Kalata 1984.
 
-    ``period``: since the reading before [s]; ``deviation``: of the errors of positions [m].
+    ``period``: since the previous reading [s]; ``deviation``: of position errors [m].
     """
     index = ACCELERATION * period * period / deviation
     r = 0.25 * (4.0 + index - math.sqrt(index * (8.0 + index)))
@@ -46,13 +38,13 @@ def alpha_beta(period: float, deviation: float) -> tuple[float, float]:
 
 @compiled
 def noise_of(w: int, i: int, memory: Surroundings) -> float:
-    """The sonar's mean error of places over range, as a vehicle sees it [1]; 0 where manoeuvres explain all."""
+    """Mean position error of the sonar over range, as observed [1]; 0 where manoeuvres explain it."""
     return max(memory.error[w, i] - MANOEUVRES, 0.0)
 
 
 @compiled
 def age_of(w: int, i: int, memory: Surroundings) -> float:
-    """Mean time since the latest new reading of each neighbour heard of late [s], 0 where there is none."""
+    """Mean time since the latest new reading of each recently detected neighbour [s], 0 without any."""
     total, num = 0.0, 0
     for k in range(memory.known.shape[2]):
         if memory.known[w, i, k] > 0.0 and memory.since[w, i, k] <= _FRESH_S:
@@ -62,10 +54,9 @@ def age_of(w: int, i: int, memory: Surroundings) -> float:
 
 @compiled
 def middle(w: int, i: int, memory: Surroundings) -> tuple[float, float, int]:
-    """The mean place of the known neighbours from the vehicle [m], those far away drawn in, and how many they are.
+    """Mean position of known neighbours from the vehicle [m], far ones drawn in, and their number.
 
-    A vehicle in the middle of a swarm has neighbours all round; one at the edge has them on one side, and so can tell
-    where the swarm is.
+    A vehicle in the middle of a swarm has neighbours all around; one at the edge has them on one side.
     """
     x, y, num, pose = 0.0, 0.0, 0, memory.pose[w, i]
     for k in range(memory.known.shape[2]):
@@ -78,14 +69,14 @@ def middle(w: int, i: int, memory: Surroundings) -> tuple[float, float, int]:
 
 @compiled
 def update_neighbours(w: int, i: int, see: Fields, period: float, memory_s: float, memory: Surroundings) -> None:
-    """Take the neighbours that a vehicle hears into those it knows."""
+    """Update a vehicle's tracks with its detections."""
     known, since, place, velocity = memory.known[w, i], memory.since[w, i], memory.place[w, i], memory.velocity[w, i]
     for k in range(known.shape[0]):
         if known[k] > 0.0:
             since[k] += period
             place[k, 0] += period * velocity[k, 0]
             place[k, 1] += period * velocity[k, 1]
-            known[k] = -known[k]  # not heard yet
+            known[k] = -known[k]  # not detected yet
     for s in range(see.detected.shape[2]):
         if see.detected[w, i, s] > 0.0:
             p_x, p_y = float(see.neighbour[w, i, s, 0]), float(see.neighbour[w, i, s, 1])
@@ -103,9 +94,9 @@ def update_neighbours(w: int, i: int, see: Fields, period: float, memory_s: floa
 
 @compiled
 def _match(x: float, y: float, reach: float, w: int, i: int, memory: Surroundings) -> int:
-    """Index of the known neighbour that is expected nearest to where one is heard, -1 for none within the gate.
+    """Index of the track predicted nearest to a detection, -1 for none within the gate.
 
-    x and y are where one is heard, in the map [m], ``reach`` is its range [m].
+    x and y are the detection in the map [m], ``reach`` is its range [m].
     """
     gate = GATE_M + GATE_SHARE * reach
     best, least, known, place = -1, gate * gate, memory.known[w, i], memory.place[w, i]
@@ -119,7 +110,7 @@ def _match(x: float, y: float, reach: float, w: int, i: int, memory: Surrounding
 
 @compiled
 def _is_detected(x: float, y: float, w: int, i: int, memory: Surroundings) -> bool:
-    """Whether another sub-sector, which overlaps, has heard the same at this decision. Arguments as for ``_match``."""
+    """Whether an overlapping sub-sector has detected the same vehicle at this decision."""
     for k in range(memory.known.shape[2]):
         dx, dy = x - memory.reading[w, i, k, 0], y - memory.reading[w, i, k, 1]
         if dx * dx + dy * dy < _SAME_M * _SAME_M and memory.known[w, i, k] > 0.0:
@@ -129,7 +120,7 @@ def _is_detected(x: float, y: float, w: int, i: int, memory: Surroundings) -> bo
 
 @compiled
 def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, memory: Surroundings) -> None:
-    """Correct a known neighbour by a reading. x, y and ``reach`` as for ``_match``."""
+    """Correct a track by a reading. x, y and ``reach`` as for ``_match``."""
     place, velocity, last = memory.place[w, i, k], memory.velocity[w, i, k], memory.reading[w, i, k]
     memory.known[w, i, k] = 1.0 - memory.known[w, i, k]
     since = memory.since[w, i, k]
@@ -147,10 +138,7 @@ def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, memory: Su
 
 @compiled
 def _meet(w: int, i: int, x: float, y: float, memory: Surroundings) -> None:
-    """Know a new neighbour, believed to move as l(t) does; where there is no room, that heard the longest ago goes.
-
-    x and y as for ``_match``.
-    """
+    """Begin a track that moves as l(t) does; without a free row, it replaces the one undetected for longest."""
     best, most = 0, -1.0
     for k in range(memory.known.shape[2]):
         if memory.known[w, i, k] == 0.0:

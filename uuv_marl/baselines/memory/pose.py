@@ -1,7 +1,7 @@
-"""Where a vehicle is in its own map: the reference point is the fix, its velocity the compass, dead reckoning the rest.
+"""Pose of a vehicle in its map: position from the reference point, heading from its velocity, else dead reckoning.
 
-Dead reckoning takes what the vehicle's own model says of its latest action, and makes up for half of what it measures
-to be different at the end.
+Dead reckoning integrates the vehicle's model under its latest action, and corrects half of the measured difference at
+the end.
 """
 
 import math
@@ -12,49 +12,41 @@ import numpy as np
 from uuv_marl.baselines.memory.actuators import identify
 from uuv_marl.baselines.memory.response import follow
 from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.percept import Fields
 from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import STILL, Plant, State6, actuators, advance, held, plant
-from uuv_marl.sim.views import Fields
 from uuv_marl.types import Float32, Float64
 
-_MOVES_MPS = 0.005
-"""l(t) moves if it is faster; scenarios know no speed below 0.01 m/s."""
+_MOVES_MPS = 0.005  # speed above which l(t) counts as moving; scenarios allow no speed below 0.01 m/s
 _TENTH = 0.1
-"""A tenth of full thrust and torque: no more, since a vehicle that turns further has another direction at the end."""
-FARTHEST_FIX_M = MAX_RANGE_M * (1.0 - 1e-6)
-"""A vector to l(t) that is longer is cut, and no fix [m]."""
+"""Share of full thrust and torque for the model's gains: small, so that the direction hardly changes in a turn."""
+FARTHEST_FIX_M = MAX_RANGE_M * (1.0 - 1e-6)  # a longer vector to l(t) is clipped and gives no fix [m]
 _TURN_TOLERANCE = 0.001
-"""Compass and dead reckoning may differ by this on a leg, beside what the yaw rate's error makes of it [rad]."""
+"""Difference of compass and dead reckoning on a leg, beside the effect of the yaw rate's error [rad]."""
 
 
 class DeadReckoning(NamedTuple):
-    """What a vehicle knows of its own motion between two decisions."""
+    """A vehicle's model of its own motion between two decisions."""
 
     plant: Plant
-    control_steps: int
-    """Control holds of a decision."""
-    steps: int
-    """Integration steps of a hold."""
-    step_s: float
-    """Time of one of them [s]."""
-    period_s: float
-    """Between two decisions [s]."""
-    surge: float
-    """Velocity that thrust gives in that time from rest, over its share [m/s]."""
-    yaw: float
-    """Yaw rate that torque gives so, or a rudder at l(t)'s speed [rad/s]."""
+    control_steps: int  # control steps in a decision
+    steps: int  # integration steps in a control step
+    step_s: float  # integration step [s]
+    period_s: float  # decision period [s]
+    surge: float  # velocity from rest after a period, over the share of full thrust [m/s]
+    yaw: float  # yaw rate after a period, over the share of full torque, or of a rudder at l(t)'s speed [rad/s]
 
     @staticmethod
     def of(scenario: Scenario) -> "DeadReckoning":
-        """That of a scenario's vehicle, undisturbed."""
+        """Model of a scenario's vehicle, undisturbed."""
         timing, still, going = scenario.timing, np.zeros(3), np.zeros(3)
-        if scenario.actuators.kind == "rudder":  # which does nothing at rest
+        if scenario.actuators.kind == "rudder":  # has no effect at rest
             going[0] = scenario.trajectory.speed_mps
         own = DeadReckoning(
-            plant(scenario), timing.control_steps_per_decision, timing.integration_steps_per_control_step, timing.integration_step_s,
-            timing.decision_period_s, 1.0, 1.0,
+            plant(scenario), timing.control_steps_per_decision, timing.integration_steps_per_control_step,
+            timing.integration_step_s, timing.decision_period_s, 1.0, 1.0,
         )  # fmt: skip
         surge = reckoned(still, np.array([_TENTH, 0.0]), own)[3] / _TENTH
         return own._replace(surge=surge, yaw=reckoned(going, np.array([0.0, _TENTH]), own)[5] / _TENTH)
@@ -62,9 +54,9 @@ class DeadReckoning(NamedTuple):
 
 @compiled
 def reckoned(motion: Float64, action: Float64 | Float32, own: DeadReckoning) -> State6:
-    """The state after one decision [m, rad, m/s, rad/s], from the origin ahead, in still water.
+    """State after one decision [m, rad, m/s, rad/s], from the origin, heading ahead, in still water.
 
-    ``motion``: surge and sway velocity [m/s] and yaw rate [rad/s] at the decision.
+    ``motion``, shape (3,): surge and sway velocity [m/s] and yaw rate [rad/s] at the decision.
     """
     state = (0.0, 0.0, 0.0, motion[0], motion[1], motion[2])
     for _ in range(own.control_steps):
@@ -77,32 +69,32 @@ def reckoned(motion: Float64, action: Float64 | Float32, own: DeadReckoning) -> 
 
 @compiled
 def to_map_axes(x: float, y: float, pose: Float64) -> tuple[float, float]:
-    """A vector ahead and to starboard along the map's axes; ``pose`` as in ``Surroundings``, shape (4,)."""
+    """Rotate a vector from the body frame to the map's axes; ``pose`` as in ``Surroundings``, shape (4,)."""
     return pose[2] * x - pose[3] * y, pose[3] * x + pose[2] * y
 
 
 @compiled
 def to_body_axes(x: float, y: float, pose: Float64) -> tuple[float, float]:
-    """A vector along the map's axes as ahead and to starboard; ``pose`` as in ``Surroundings``, shape (4,)."""
+    """Rotate a vector from the map's axes to the body frame; ``pose`` as in ``Surroundings``, shape (4,)."""
     return pose[2] * x + pose[3] * y, pose[2] * y - pose[3] * x
 
 
 @compiled
 def to_map(x: float, y: float, pose: Float64) -> tuple[float, float]:
-    """A point ahead and to starboard [m] in the map [m]; ``pose`` as in ``Surroundings``, shape (4,)."""
+    """Transform a point from the body frame [m] to the map [m]; ``pose`` as in ``Surroundings``, shape (4,)."""
     x, y = to_map_axes(x, y, pose)
     return pose[0] + x, pose[1] + y
 
 
 @compiled
 def to_body(x: float, y: float, pose: Float64) -> tuple[float, float]:
-    """A point of the map [m], ahead and to starboard [m]; ``pose`` as in ``Surroundings``, shape (4,)."""
+    """Transform a point from the map [m] to the body frame [m]; ``pose`` as in ``Surroundings``, shape (4,)."""
     return to_body_axes(x - pose[0], y - pose[1], pose)
 
 
 @compiled
 def begin_map(w: int, i: int, see: Fields, memory: Surroundings) -> None:
-    """The first percept: the map's origin is at l(t), its first axis along l(t)'s velocity, or along the bow."""
+    """First percept: the map's origin is at l(t), its first axis along l(t)'s velocity, or along the bow."""
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
     speed = math.hypot(v_x, v_y)
     c, s, moving = 1.0, 0.0, 0.0
@@ -118,9 +110,9 @@ def begin_map(w: int, i: int, see: Fields, memory: Surroundings) -> None:
 
 @compiled
 def move(w: int, i: int, see: Fields, own: DeadReckoning, memory: Surroundings) -> None:
-    """A later percept: heading and place from l(t) while it stays on its leg, or at rest; else by dead reckoning.
+    """Later percept: pose from l(t) while it stays on its leg or at rest, else from dead reckoning.
 
-    Who does not perceive l(t), whose place and velocity then read zero, always reckons.
+    Where l(t) is not perceived, its position and velocity read zero, and the pose is always from dead reckoning.
     """
     pose, at, motion = memory.pose[w, i], memory.reference[w, i], memory.motion[w, i]
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])
@@ -165,7 +157,7 @@ def move(w: int, i: int, see: Fields, own: DeadReckoning, memory: Surroundings) 
 
 @compiled
 def keep_motion(w: int, i: int, see: Fields, memory: Surroundings) -> None:
-    """Own velocity and l(t)'s speed, for the next percept."""
+    """Store own velocity and l(t)'s speed for the next percept."""
     memory.motion[w, i, 0], memory.motion[w, i, 1] = see.velocity[w, i, 0], see.velocity[w, i, 1]
     memory.motion[w, i, 2] = see.yaw_rate[w, i, 0]
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])

@@ -1,4 +1,4 @@
-"""A percept taken into what a vehicle remembers: where it is, the obstacles, the neighbours."""
+"""Update of a vehicle's memory from a percept: position, obstacles, neighbours."""
 
 import math
 from typing import NamedTuple
@@ -15,22 +15,20 @@ from uuv_marl.types import Bool, Float32
 
 
 class OwnModel(NamedTuple):
-    """What a vehicle knows of itself before it remembers anything."""
+    """A vehicle's model of its motion and sonar."""
 
     own: DeadReckoning
-    """How it moves."""
     sectors: ActiveSectors
-    """How it hears obstacles."""
 
     @staticmethod
     def of(scenario: Scenario) -> "OwnModel":
-        """That of a scenario's vehicle."""
+        """Model of a scenario's vehicle."""
         return OwnModel(DeadReckoning.of(scenario), ActiveSectors.of(scenario))
 
 
 @compiled
 def is_lost_percept(row: Float32) -> bool:
-    """Whether a percept, shape (entry,), is that of a lost vehicle: all zero."""
+    """Whether a percept, shape (entry,), is a lost vehicle's: all zero."""
     for k in range(row.shape[0]):  # noqa: SIM110 - compiled
         if row[k] != 0.0:
             return False
@@ -41,7 +39,7 @@ def is_lost_percept(row: Float32) -> bool:
 def update_memory(
     flat: Float32, at: Starts, worlds: Bool, model: OwnModel, memory_s: float, memory: Surroundings
 ) -> None:
-    """Take what every vehicle perceives into what it remembers. Once for every decision."""
+    """Update every vehicle's memory from its percept. Call it once for every decision."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1] if worlds[w] else 0):
@@ -63,7 +61,7 @@ def update_memory(
 
 @compiled
 def _keep_distances(w: int, i: int, memory: Surroundings) -> None:
-    """How far a vehicle is from what it remembers, once for all that decides by it."""
+    """Store the distances of remembered obstacles and neighbours."""
     x, y = memory.pose[w, i, 0], memory.pose[w, i, 1]
     for d in range(memory.score.shape[2]):
         in_use = memory.score[w, i, d] > 0.0

@@ -1,41 +1,34 @@
-"""The paper's controller (Eq. 18-22), from positions alone, and the strongest hand-made form of the same law."""
+"""The paper's controller (Eq. 18-22), from positions alone, and its strongest hand-made form."""
 
 import math
-from typing import ClassVar, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from uuv_marl.baselines.policy import Limits, Policy, surge_resistance, tuned, write_action
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.errors import PolicyError
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Int64
 
-FEED_FORWARD = 1.2
-"""Feed-forward of ``bio_inspired_plus``: a little more than the drag, as it acts along the reference, not the bow."""
-MAX_EXPONENT = 50.0
-"""exp(length / distance) is bounded here [1]."""
-MIN_DISTANCE_M = 0.5
-"""Distances in the exponent are at least this [m]."""
+FEED_FORWARD = 1.2  # feed-forward of ``bio_inspired_plus``: a little more than the drag, as it acts along the reference
+MAX_EXPONENT = 50.0  # largest exponent length / distance [1]
+MIN_DISTANCE_M = 0.5  # smallest distance in the exponent [m]
 
 
 class BioInspiredGains(NamedTuple):
-    """Eq. 18-21; the defaults are Table 1."""
+    """Gains of Eq. 18-21; the defaults are Table 1."""
 
-    zeta_l: float = 30.0
-    """Attraction to the reference point [N/m]. Table 1."""
-    zeta_n: float = 0.8
-    """Weight of neighbours [N/m]. Table 1."""
-    delta_n: float = 60.0
-    """Distance at which neighbours neither attract nor repel [m]. Table 1."""
-    zeta_o: float = 8.0
-    """Weight of obstacles [N/m]. Table 1."""
-    delta_o: float = 80.0
-    """Decay length of their repulsion [m]. Table 1."""
+    zeta_l: float = 30.0  # attraction to the reference point [N/m]
+    zeta_n: float = 0.8  # weight of neighbours [N/m]
+    delta_n: float = 60.0  # distance at which neighbours neither attract nor repel [m]
+    zeta_o: float = 8.0  # weight of obstacles [N/m]
+    delta_o: float = 80.0  # decay length of their repulsion [m]
+    # multiple of the drag at the reference's velocity that is added as thrust [1]; none in the paper
     feed_forward: float = 0.0
-    """Multiple of the drag at the reference's velocity that is pushed in advance; none in the paper."""
 
 
 ObstacleTerm = Literal["per_echo", "per_obstacle"]
@@ -46,11 +39,11 @@ class BioInspired(Policy):
 
     Args:
         gains: Table 1 by default.
-        obstacle_term: Eq. 21's sum runs over echoes, or over obstacles. Adjacent sub-sectors that echo count as one
-            obstacle where their positions agree (centres) or follow without a gap (surfaces); its nearest echo counts.
+        obstacle_term: Eq. 21's sum is over echoes or over obstacles. Echoes of adjacent sub-sectors count as one
+            obstacle, by the nearest echo, where their positions agree (centres) or follow without a gap (surfaces).
     """
 
-    outputs_force: ClassVar[bool] = True
+    requirements = PolicyRequirements(outputs_force=True)
 
     def __init__(
         self,
@@ -76,13 +69,9 @@ class BioInspired(Policy):
 
 
 class BioInspiredPlus(BioInspired):
-    """The same law with feed-forward of the reference's velocity, yaw damping, and tuned gains.
+    """The same controller with feed-forward of the reference's velocity, yaw damping and tuned gains."""
 
-    Args:
-        gains: those that were tuned by default.
-    """
-
-    yaw_damping_nms: ClassVar[float] = 600.0
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: BioInspiredGains | None = None) -> None:
         tuned_gains = gains or BioInspiredGains(**tuned("bio_inspired_plus"), feed_forward=FEED_FORWARD)
@@ -91,7 +80,7 @@ class BioInspiredPlus(BioInspired):
 
 @compiled
 def bounded_exp(length: float, distance: float) -> tuple[float, int]:
-    """exp(length / distance) [1], with the distance kept above 0.5 m and the exponent below 50; 1 if either bound."""
+    """exp(length / distance) [1], distance at least 0.5 m and exponent at most 50, and 1 if a bound is active."""
     clamped = int(distance < MIN_DISTANCE_M)
     exponent = length / max(distance, MIN_DISTANCE_M)
     if exponent > MAX_EXPONENT:
@@ -101,7 +90,7 @@ def bounded_exp(length: float, distance: float) -> tuple[float, int]:
 
 @compiled
 def neighbour_force(p_x: float, p_y: float, g: BioInspiredGains) -> tuple[float, float, int]:
-    """Force [N] from a neighbour at p, relative to the vehicle [m]; zero at delta_n. One term of Eq. 20."""
+    """Force [N] from a neighbour at p relative to the vehicle [m], zero at delta_n. One term of Eq. 20."""
     value, clamped = bounded_exp(g.delta_n, math.hypot(p_x, p_y))
     weight = -g.zeta_n * (value - math.e)
     return weight * p_x, weight * p_y, clamped
@@ -109,7 +98,7 @@ def neighbour_force(p_x: float, p_y: float, g: BioInspiredGains) -> tuple[float,
 
 @compiled
 def obstacle_force(p_x: float, p_y: float, g: BioInspiredGains) -> tuple[float, float, int]:
-    """Force [N] from an obstacle at p, relative to the vehicle [m]. One term of Eq. 21."""
+    """Force [N] from an obstacle at p relative to the vehicle [m]. One term of Eq. 21."""
     value, clamped = bounded_exp(g.delta_o, math.hypot(p_x, p_y))
     weight = -g.zeta_o * value
     return weight * p_x, weight * p_y, clamped
@@ -117,7 +106,7 @@ def obstacle_force(p_x: float, p_y: float, g: BioInspiredGains) -> tuple[float, 
 
 @compiled
 def counts_once(w: int, i: int, a: int, see: Fields, centres: bool) -> bool:
-    """Whether active sub-sector a holds the echo that stands for its whole obstacle: the nearest, first of equals."""
+    """Whether active sub-sector a holds the echo that stands for its obstacle: the nearest, first of equals."""
     reach, position = see.echo_range[w, i, a], see.echo_position[w, i]
     for side in (-1, 1):
         other = a + side
@@ -136,7 +125,6 @@ def _act(
     flat: Float32, at: Starts, g: BioInspiredGains, limits: Limits, once: bool, centres: bool, action: Float32,
     clamps: Int64,
 ) -> None:  # fmt: skip
-    """The law for every vehicle. Eq. 18-22. With ``once``, adjacent echoes of one obstacle count once."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):

@@ -1,9 +1,9 @@
-"""A comparator in the style of single-informed distributed consensus (SDC), a reconstruction: the paper only names it.
+"""Single-informed distributed consensus (SDC): a reconstruction, since the paper only names it.
 
-Every vehicle holds a slot of a hexagonal lattice relative to its predecessors: the neighbours it hears whose slots are
-nearer to the informed vehicle's. So what the one informed vehicle reads of l(t) spreads outwards along a directed
-graph. The error is kept within a shrinking funnel (prescribed performance), and a velocity coordination term, a
-short-range repulsion and an obstacle term are added.
+Every vehicle holds a slot of a hexagonal lattice relative to its predecessors: the detected neighbours whose slots are
+nearer to the informed vehicle's. The informed vehicle's knowledge of l(t) thus spreads outwards along a directed graph.
+The error is kept within a shrinking funnel (prescribed performance), and a velocity coordination term, a short-range
+repulsion and an obstacle term are added.
 """
 
 import math
@@ -14,57 +14,43 @@ from scipy.optimize import linear_sum_assignment
 
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.errors import PolicyError
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import described
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Bool, Float32, Float64, Int64
 
-SLOT_PITCH_M = 12.0
-"""Distance between neighbouring slots."""
+SLOT_PITCH_M = 12.0  # distance between neighbouring slots
 _MAX_XI = 0.99
 _MOST_VEHICLES = 2000
-"""Slots are assigned in a time that grows with the cube of the swarm: 1.5 s here, a quarter of an hour for 16,384."""
+"""Slot assignment takes time cubic in the swarm's size: 1.5 s here, a quarter of an hour for 16,384 vehicles."""
 
 
 class SdcGains(NamedTuple):
     """Free parameters, found by tuning."""
 
-    consensus: float
-    """Force per unit of transformed error [N]."""
-    rho_0: float
-    """Half width of the funnel at the start [m]."""
-    rho_inf: float
-    """Half width of the funnel in the end [m]."""
-    kappa: float
-    """How fast it shrinks [1/s]."""
-    reference: float
-    """Weight of l(t) in the informed vehicle's error, all predecessors together weighing 1 [1]."""
-    velocity: float
-    """Velocity coordination [N s/m]."""
-    short: float
-    """Largest short-range repulsion per neighbour [N]."""
-    short_range: float
-    """Distance at which the short-range repulsion ends [m]."""
-    repulsion: float
-    """Largest repulsion from an obstacle [N]."""
-    repulsion_range: float
-    """Distance to the surface at which the repulsion ends [m]."""
-    tangential: float
-    """Largest sideways push [N]."""
-    tangential_range: float
-    """Distance to the surface at which the sideways push ends [m]."""
-    drag: float
-    """Share of the vehicle's own drag that it makes up for [1]."""
-    reference_velocity: float
-    """Damping of the informed vehicle towards the reference's velocity [N s/m]."""
+    consensus: float  # force per unit of transformed error [N]
+    rho_0: float  # half width of the funnel at the start [m]
+    rho_inf: float  # half width of the funnel in the end [m]
+    kappa: float  # decay rate of the funnel [1/s]
+    reference: float  # weight of l(t) in the informed vehicle's error, all predecessors together weighing 1 [1]
+    velocity: float  # velocity coordination [N s/m]
+    short: float  # largest short-range repulsion per neighbour [N]
+    short_range: float  # distance at which the short-range repulsion ends [m]
+    repulsion: float  # largest repulsion from an obstacle [N]
+    repulsion_range: float  # distance to the surface at which the repulsion ends [m]
+    tangential: float  # largest sideways push [N]
+    tangential_range: float  # distance to the surface at which the sideways push ends [m]
+    drag: float  # share of the vehicle's drag that is compensated [1]
+    reference_velocity: float  # damping of the informed vehicle towards the reference's velocity [N s/m]
 
 
 @described
 class SdcMemory(NamedTuple):
-    """The slots of the lattice, and how long they have been held."""
+    """Slots of the lattice, and the time for which they have been held."""
 
     slots: Annotated[Float64, "world vehicle 2", "Each vehicle's slot, north and east of the lattice's centre [m]."]
     depth: Annotated[Float64, "world vehicle", "Its distance from the informed vehicle's slot [m]."]
@@ -72,18 +58,15 @@ class SdcMemory(NamedTuple):
 
 
 class Sdc(Policy):
-    """Distributed consensus with prescribed performance; one vehicle alone reads the reference.
+    """Distributed consensus with prescribed performance; a single vehicle perceives the reference.
 
-    Slots are assigned before the mission, centrally, from the first percepts of a world; from then on every vehicle
-    acts on its own percept. The informed vehicle is the one whose slot is nearest to the lattice's centre.
+    Slots are assigned centrally from the first percepts of a world; from then on every vehicle acts on its own percept.
+    The informed vehicle is the one whose slot is nearest to the lattice's centre.
     """
 
-    outputs_force: ClassVar[bool] = True
+    # Without yaw damping, in the settings tried by hand, the informed vehicle left the others behind: none arrived.
+    requirements = PolicyRequirements(("compass", "link"), yaw_damping_nms=600.0, identity=True, outputs_force=True)
     Memory: ClassVar[type[Any] | None] = SdcMemory
-    channels: ClassVar[tuple[str, ...]] = ("compass", "link")
-    identity: ClassVar[bool | str] = True
-    yaw_damping_nms: ClassVar[float] = 600.0
-    """Without it, in the settings tried by hand, the informed vehicle left the others behind and none arrived."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SdcGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
@@ -114,7 +97,7 @@ class Sdc(Policy):
         return action
 
     def _assign(self, w: int, percept: Percept) -> None:
-        """Each vehicle's slot, so that the sum of squared ways from the start is smallest."""
+        """Assign slots with the smallest sum of squared distances from the start."""
         compass, to_reference = percept["compass"].astype(np.float64), percept["reference"].astype(np.float64)
         c, s = compass[:, 0], compass[:, 1]
         places = -np.stack(
@@ -130,7 +113,7 @@ class Sdc(Policy):
 
 
 def hexagonal_slots(n: int) -> Float64:
-    """The n points of a hexagonal lattice nearest to its centre, their mean at zero [m], shape (vehicle, 2)."""
+    """The n points of a hexagonal lattice nearest to its centre, mean zero [m], shape (vehicle, 2)."""
     reach = math.ceil(math.sqrt(n)) + 2
     row, column = (axis.ravel() - reach for axis in np.indices((2 * reach + 1, 2 * reach + 1)))
     points: Float64 = SLOT_PITCH_M * np.stack([row * math.sqrt(3) / 2, column + 0.5 * (row % 2)], axis=1)
@@ -145,11 +128,10 @@ def _act(
     flat: Float32, at: Starts, g: SdcGains, limits: Limits, slots: Float64, depth: Float64, rho: Float64,
     action: Float32, clamps: Int64,
 ) -> None:  # fmt: skip
-    """The law for every vehicle.
+    """Write every vehicle's action.
 
-    ``slots``: place of every vehicle in the formation, north and east [m], shape (world, vehicle, 2); ``depth``:
-    distance of its place from the informed vehicle's [m], shape (world, vehicle). ``rho``: half width of the funnel
-    [m], shape (world,).
+    ``slots`` holds positions in the formation, north and east [m], shape (world, vehicle, 2); ``depth`` their distances
+    from the informed vehicle's [m], shape (world, vehicle); ``rho`` the funnel's half width [m], shape (world,).
     """
     see = fields(flat, at)
     for w in range(flat.shape[0]):
@@ -161,7 +143,7 @@ def _act(
 
 @compiled
 def _index(identity: float, num: int) -> int:
-    """Index of the vehicle with this identity, -1 where nobody has it: no number of a percept is an index unchecked."""
+    """Index of the vehicle with this identity, -1 if no vehicle has it."""
     return int(identity) - 1 if 1.0 <= identity < num + 1.0 else -1
 
 
@@ -169,15 +151,15 @@ def _index(identity: float, num: int) -> int:
 def _force(
     w: int, i: int, see: Fields, g: SdcGains, limits: Limits, slots: Float64, depth: Float64, rho: float
 ) -> tuple[float, float, int]:
-    """Body-frame force on one vehicle [N], forward and to starboard, and 1 where the funnel's bound binds.
+    """Body-frame force on one vehicle [N], forward and to starboard, and 1 if the funnel's bound is active.
 
-    ``slots`` and ``depth`` are those of the world, ``rho`` the half width of the funnel [m]. The vehicle at depth 0 is
-    informed and uses the reference.
+    ``slots`` (vehicle, 2) and ``depth`` (vehicle,) are those of the world, ``rho`` the half width of the funnel [m].
+    The vehicle at depth 0 is informed and uses the reference.
     """
     informed = depth[i] == 0.0
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     c, s = float(see.compass[w, i, 0]), float(see.compass[w, i, 1])
-    # Who hears no predecessor, as the informed vehicle itself, coordinates with all it hears.
+    # A vehicle without detected predecessors, such as the informed one, coordinates with all its neighbours.
     follows = False
     for k in range(see.detected.shape[2]):
         j = _index(see.link_identity[w, i, k], depth.shape[0])

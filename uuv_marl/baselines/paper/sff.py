@@ -1,8 +1,8 @@
-"""A comparator in the style of self-organised fission and fusion (SFF), a reconstruction: the paper only names it.
+"""Self-organised fission and fusion (SFF): a reconstruction, since the paper only names it.
 
 Neighbours' positions are predicted from their history; a clustering term acts on the predictions, a hybrid velocity
-term follows the neighbours' mean or, once an obstacle echoes, the one whose motion changed most; a splitting term
-passes obstacles on either side; and the vehicle is pulled to l(t).
+term follows the neighbours' mean or, while an obstacle is detected, the neighbour whose motion changed most; a
+splitting term passes obstacles on either side; and the vehicle is pulled to l(t).
 """
 
 import math
@@ -12,74 +12,60 @@ import numpy as np
 
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
 from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.baselines.requirements import PolicyRequirements
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import described
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Bool, Float32, Float64
 
-HORIZON_S = 1.0
-"""How far ahead neighbours are predicted."""
+HORIZON_S = 1.0  # time ahead for which neighbours are predicted [s]
 _MAX_RATE_MPS = 8.0
 
 
 class SffGains(NamedTuple):
     """Free parameters, found by tuning."""
 
-    pull: float
-    """Largest pull to l(t) [N]."""
-    pull_length: float
-    """Distance at which the pull is 0.7 of that [m]."""
-    cluster: float
-    """Largest clustering force per neighbour [N]."""
-    cluster_distance: float
-    """Distance at which the clustering force changes its sign [m]."""
-    cluster_width: float
-    """Length of its transition [m]."""
-    cluster_range: float
-    """Distance at which the clustering force ends [m]."""
-    velocity: float
-    """Velocity coordination [N s/m]."""
-    blend: float
-    """Weight of the neighbour whose motion changed most, while an obstacle echoes [1]."""
-    repulsion: float
-    """Largest repulsion from an obstacle [N]."""
-    repulsion_range: float
-    """Distance to the surface at which the repulsion ends [m]."""
-    tangential: float
-    """Largest sideways push [N]."""
-    tangential_range: float
-    """Distance to the surface at which the sideways push ends [m]."""
-    drag: float
-    """Share of the vehicle's own drag that it makes up for [1]."""
+    pull: float  # largest pull to l(t) [N]
+    pull_length: float  # distance at which the pull is 0.7 of that [m]
+    cluster: float  # largest clustering force per neighbour [N]
+    cluster_distance: float  # distance at which the clustering force changes its sign [m]
+    cluster_width: float  # length of its transition [m]
+    cluster_range: float  # distance at which the clustering force ends [m]
+    velocity: float  # velocity coordination [N s/m]
+    blend: float  # weight of the neighbour whose motion changed most, while an obstacle is detected [1]
+    repulsion: float  # largest repulsion from an obstacle [N]
+    repulsion_range: float  # distance to the surface at which the repulsion ends [m]
+    tangential: float  # largest sideways push [N]
+    tangential_range: float  # distance to the surface at which the sideways push ends [m]
+    drag: float  # share of the vehicle's drag that is compensated [1]
 
 
 @described
 class SffMemory(NamedTuple):
-    """What each vehicle heard, and how that has changed since the decision before, in its body frame."""
+    """Detected neighbours and their changes since the previous decision, in the body frame."""
 
-    identity: Annotated[Float32, "world vehicle sector", "Who is heard, 0 for nobody."]
-    position: Annotated[Float64, "world vehicle sector 2", "Where [m]."]
-    velocity: Annotated[Float64, "world vehicle sector 2", "How it moves [m/s]."]
-    known: Annotated[Bool, "world vehicle sector", "Whether it was heard at the decision before."]
+    identity: Annotated[Float32, "world vehicle sector", "Identity of the vehicle detected, 0 for none."]
+    position: Annotated[Float64, "world vehicle sector 2", "Its position [m]."]
+    velocity: Annotated[Float64, "world vehicle sector 2", "Its velocity [m/s]."]
+    known: Annotated[Bool, "world vehicle sector", "Whether it was detected at the previous decision."]
     rate: Annotated[Float64, "world vehicle sector 2", "Change of its position since then, per second [m/s]."]
     turn: Annotated[Float64, "world vehicle sector 2", "Change of its velocity since then [m/s]."]
 
 
 class Sff(Policy):
-    """Self-organised fission and fusion, with neighbours' velocity over the link, without the reference's velocity."""
+    """Self-organised fission and fusion, with neighbours' velocities over the link, but not the reference's."""
 
-    outputs_force: ClassVar[bool] = True
+    requirements = PolicyRequirements(("link",), outputs_force=True)
     Memory: ClassVar[type[Any] | None] = SffMemory
-    channels: ClassVar[tuple[str, ...]] = ("link",)
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SffGains | None = None) -> None:
         super().__init__(scenario, num_worlds)
         self.gains = gains or SffGains(**tuned("sff"))
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Compare what is heard with what was heard."""
+        """Compare the detected neighbours with those of the previous decision."""
         period = self.scenario.timing.decision_period_s
         _remember(self.flat(percept), self.at, period, worlds, self.memory)
 
@@ -100,7 +86,7 @@ def clustering(d: float, g: SffGains) -> float:
 
 @compiled
 def _recall(identity: float, known: Float32) -> int:
-    """The sub-sector in which a vehicle was heard before, -1 for none; 0 is nobody's identity."""
+    """The sub-sector in which a vehicle was detected before, -1 for none; identity 0 stands for no vehicle."""
     if not identity >= 1.0:
         return -1
     for k in range(known.shape[0]):
@@ -111,7 +97,6 @@ def _recall(identity: float, known: Float32) -> int:
 
 @compiled
 def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: SffMemory) -> None:
-    """What every vehicle hears, beside what it heard before."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
@@ -121,10 +106,7 @@ def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: Sf
 
 @compiled
 def _compare(w: int, i: int, see: Fields, period: float, memory: SffMemory) -> None:
-    """What one vehicle hears, beside what it heard; the frame has turned by its yaw rate times the period since.
-
-    ``memory`` is brought up to date.
-    """
+    """Update one vehicle's memory; since the previous decision its frame has turned by yaw rate times period."""
     identities, positions, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
     r = float(see.yaw_rate[w, i, 0])
     c, s = math.cos(r * period), math.sin(r * period)
@@ -146,7 +128,6 @@ def _compare(w: int, i: int, see: Fields, period: float, memory: SffMemory) -> N
 
 @compiled
 def _decide(flat: Float32, at: Starts, g: SffGains, limits: Limits, memory: SffMemory, action: Float32) -> None:
-    """The law for every vehicle."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):

@@ -1,4 +1,4 @@
-"""The safety filter, and who keeps to it."""
+"""The safety filter and the policies that use it."""
 
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
 

@@ -1,10 +1,10 @@
-"""A safety filter: the velocity nearest to a wished one that keeps clear of the things a vehicle remembers.
+"""Safety filter: the velocity nearest to a desired one that keeps clear of remembered obstacles and neighbours.
 
 A control barrier function on velocities (Ames, Coogan, Egerstedt, Notomista, Sreenath and Tabuada, Control barrier
-functions: theory and applications, ECC 2019): the distance to an obstacle or neighbour may shrink no faster than in
-proportion to what is left of it beyond a margin, n . v <= gamma (d - margin). A vehicle that keeps to it stays
-beyond the margin. If two neighbours must change a velocity, each makes a share of the change, as in reciprocal
-avoidance (van den Berg et al. 2011, see ``halfplanes``).
+functions: theory and applications, ECC 2019): the distance d to an obstacle or neighbour may shrink no faster than in
+proportion to its excess over a margin, n . v <= gamma (d - margin), so that a vehicle stays beyond the margin. Of two
+neighbours that must change a velocity, each makes a share of the change, as in reciprocal avoidance (van den Berg et
+al. 2011, see ``halfplanes``).
 """
 
 import math
@@ -27,38 +27,28 @@ G = TypeVar("G")
 class Barrier(NamedTuple):
     """Margins and rates of the filter, found by hand on tuning seeds.
 
-    13.5 m is the largest distance that the paper states, 12.63 m, and about the metre that sway costs, which can't be
-    braked; 0.3 of a gap of 20 m, the narrowest of ``random_field``, is 6 m, more than the paper's s_o is taken for.
+    13.5 m is the largest distance that the paper states, 12.63 m, and about the metre lost by sway, which can't be
+    braked; 0.3 of a gap of 20 m, the narrowest of ``random_field``, is 6 m, more than the assumed s_o of the paper.
     """
 
-    obstacle_m: float = 13.5
-    """Distance kept from surfaces of obstacles [m]."""
-    gap_share: float = 0.3
-    """Largest share of the gap between two obstacles that is kept from each of them [1]."""
-    narrowest_m: float = 8.0
-    """A gap narrower than this is no way through [m]."""
-    obstacle_rate: float = 1.0
-    """How fast that distance may be closed, per metre beyond it [1/s]."""
-    neighbour_m: float = 7.0
-    """Distance kept from neighbours [m]."""
-    neighbour_rate: float = 1.0
-    """How fast that distance may be closed, per metre beyond it [1/s]."""
-    noise_margin: float = 3.0
-    """Factor of the mean error of neighbours' places; the product is added to that distance [1]."""
-    share: float = 0.6
-    """Share of the change that two neighbours need which each of them makes [1]; half would do if both knew all."""
-    horizon_m: float = 60.0
-    """Neighbours and surfaces farther than this are left out [m]."""
+    obstacle_m: float = 13.5  # distance kept from surfaces of obstacles [m]
+    gap_share: float = 0.3  # largest share of the gap between two obstacles that is kept from each of them [1]
+    narrowest_m: float = 8.0  # a narrower gap counts as closed [m]
+    obstacle_rate: float = 1.0  # largest closing speed per metre beyond that distance [1/s]
+    neighbour_m: float = 7.0  # distance kept from neighbours [m]
+    neighbour_rate: float = 1.0  # largest closing speed per metre beyond that distance [1/s]
+    noise_margin: float = 3.0  # factor of the neighbours' mean position error, added to that distance [1]
+    share: float = 0.6  # share of a change that each of two neighbours makes [1]; half would do with full information
+    horizon_m: float = 60.0  # neighbours and surfaces farther away are ignored [m]
 
 
-MOST_CLOSED = 0.3
-"""Share of the distance left that may be closed in a decision period [1]."""
+MOST_CLOSED = 0.3  # largest share of the remaining distance that is closed in a decision period [1]
 GUARD = Barrier(obstacle_m=6.0, obstacle_rate=2.0)
-"""The filter of ``guarded:``. It lets a policy nearer to obstacles than a law that makes room early has to go."""
+"""The filter of ``safety_filter=true``, with smaller margins than a controller that avoids obstacles early."""
 
 
 def with_numbers(values: Mapping[str, float], gains: G, barrier: Barrier) -> tuple[G, Barrier]:
-    """A law's gains, a NamedTuple, and its filter, with the numbers by name that belong to the one or the other."""
+    """Gains and filter with the values by name that belong to the one or the other."""
     both: tuple[Any, Any] = gains, barrier
     updated = [
         each._replace(**{name: value for name, value in values.items() if name in each._fields}) for each in both
@@ -83,11 +73,7 @@ def margin(w: int, i: int, d: int, barrier: Barrier, memory: Surroundings) -> fl
 
 @compiled
 def planes_of(w: int, i: int, period: float, barrier: Barrier, memory: Surroundings, planes: Float64) -> int:
-    """Half-planes of velocity in the vehicle's map, n . v <= b, for what it remembers.
-
-    Returns:
-        How many there are.
-    """
+    """Write the half-planes n . v <= b of remembered obstacles and neighbours in the map; returns their number."""
     pose, num = memory.pose[w, i], 0
     x, y = pose[0], pose[1]
     rate = min(barrier.obstacle_rate, MOST_CLOSED / period)
@@ -108,7 +94,7 @@ def planes_of(w: int, i: int, period: float, barrier: Barrier, memory: Surroundi
 def neighbour_planes(
     w: int, i: int, num: int, period: float, barrier: Barrier, memory: Surroundings, planes: Float64
 ) -> int:
-    """Add the half-planes of neighbours to the first ``num``, and say how many there are then. See ``planes_of``."""
+    """Write the half-planes of neighbours after the first ``num``; returns the number of planes."""
     x, y = memory.pose[w, i, 0], memory.pose[w, i, 1]
     v_x, v_y = to_map_axes(memory.motion[w, i, 0], memory.motion[w, i, 1], memory.pose[w, i])
     rate = min(barrier.neighbour_rate, MOST_CLOSED / period)
@@ -127,7 +113,7 @@ def neighbour_planes(
 
 @compiled
 def keeps(v_x: float, v_y: float, planes: Float64, num: int) -> bool:
-    """Whether a velocity keeps to half-planes."""
+    """Whether a velocity satisfies the half-planes."""
     for k in range(num):  # noqa: SIM110 - compiled
         if planes[k, 0] * v_x + planes[k, 1] * v_y > planes[k, 2]:
             return False
@@ -139,9 +125,9 @@ def steer_safely(
     w: int, i: int, w_x: float, w_y: float, num: int, planes: Float64, gain: float, limits: Limits,
     memory: Surroundings, action: Float32,
 ) -> None:  # fmt: skip
-    """The action that takes a vehicle to the velocity that keeps to half-planes and is nearest to a wished one.
+    """Write the action for the velocity nearest to a desired one that satisfies the half-planes.
 
-    Whether the filter acts is written.
+    ``memory.filtered`` records whether the filter acts.
     """
     safe_x, safe_y, broken = nearest_velocity(w_x, w_y, planes, num, 0, full_speed(limits))
     if broken > 0.0 or not keeps(w_x, w_y, planes, num):

@@ -1,4 +1,4 @@
-"""Base of the policies that remember their surroundings and keep to the safety filter."""
+"""Base class of policies with a memory of their surroundings and the safety filter."""
 
 from typing import Any, ClassVar
 
@@ -7,6 +7,7 @@ import numpy as np
 from uuv_marl.baselines.memory import OwnModel, Surroundings, update_memory
 from uuv_marl.baselines.memory.neighbours import MEMORY_S
 from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.steering import velocity_gain
 from uuv_marl.percept import Percept
@@ -15,11 +16,11 @@ from uuv_marl.scenario.turning import turning_radius
 from uuv_marl.types import Bool, Float64, Int64
 
 TURNS = 8.0
-"""Turning radii at l(t)'s speed, at least, in which a vehicle with a rudder closes a distance that is left. By hand."""
+"""Least number of turning radii at l(t)'s speed in which a vehicle with a rudder closes a distance. By hand."""
 
 
 def turnable(barrier: Barrier, scenario: Scenario) -> Barrier:
-    """A filter whose rates leave a vehicle with a rudder the way to turn in: speed over ``TURNS`` turning radii."""
+    """A filter with rates of at most speed over ``TURNS`` turning radii, for vehicles with a rudder."""
     speed = scenario.trajectory.speed_mps
     radius = turning_radius(scenario.vehicle, scenario.actuators, speed)  # pyright: ignore[reportArgumentType] - frozen models have a hash
     if radius == 0.0:
@@ -31,38 +32,37 @@ def turnable(barrier: Barrier, scenario: Scenario) -> Barrier:
 
 
 class Filtered(Policy):
-    """A policy that remembers, and whose velocities are made safe. A subclass defines ``decide``."""
+    """A policy with a memory, whose velocities pass the safety filter. A subclass defines ``decide``."""
 
-    yaw_damping_nms: ClassVar[float] = 600.0
-    outputs_force: ClassVar[bool] = True
+    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
     Memory: ClassVar[type[Any] | None] = Surroundings
 
     def __init__(self, scenario: Scenario, num_worlds: int, barrier: Barrier) -> None:
         super().__init__(scenario, num_worlds)
         self.barrier = turnable(Barrier(*map(float, barrier)), scenario)
         self.model = OwnModel.of(scenario)
-        """What vehicles know of themselves."""
+        """Model of the vehicle's motion and sonar."""
         self.gain = velocity_gain(scenario)
         """Force per velocity error [N s/m]."""
         self.planes: Float64 = np.zeros((self.memory.disc.shape[2] + scenario.sonar.num_sectors, 3))
-        """Room for half-planes."""
+        """Work array for half-planes, shape (disc + sector, 3)."""
 
     @property
     def changed(self) -> Int64:
         """Velocities that the filter changed since the reset, shape (world,)."""
-        return self._times(0)
+        return self._count(0)
 
     @property
     def infeasible(self) -> Int64:
-        """Changed velocities for which no velocity was safe, so the least unsafe one was taken, shape (world,)."""
-        return self._times(1)
+        """Changed velocities for which no velocity was safe, so that the least unsafe was taken, shape (world,)."""
+        return self._count(1)
 
-    def _times(self, what: int) -> Int64:
-        return (self.memory.counted + self.memory.filtered)[..., what].sum(axis=1).astype(np.int64)
+    def _count(self, column: int) -> Int64:
+        return (self.memory.counted + self.memory.filtered)[..., column].sum(axis=1).astype(np.int64)
 
     @property
     def memory_s(self) -> float:
-        """For how long a neighbour is remembered that is heard no more [s]."""
+        """Time for which an undetected neighbour is remembered [s]."""
         return MEMORY_S
 
     def remember(self, percept: Percept, worlds: Bool) -> None:

@@ -1,10 +1,10 @@
 """``NAME,safety_filter=true``: the safety filter around any policy.
 
-The policy decides on an action. If the velocity that follows from the action would bring the vehicle too near to
-something that it remembers, the filter takes a safe velocity instead: the one nearest to the velocity at which the
-resistance equals the action's force. If nothing is near, actions stay as they are, bit for bit.
+If the velocity that follows from the policy's action would bring the vehicle too near to a remembered obstacle or
+neighbour, the filter replaces it by the safe velocity nearest to the one at which resistance equals the action's force.
+Otherwise actions stay as they are, bit for bit.
 
-With a rudder the action is the wished force; its torque is close to the rudder's at cruise speed.
+With a rudder the action is the desired force; its torque is close to the rudder's at cruise speed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,44 +37,41 @@ class Guarded(Filtered):
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: Policy, barrier: Barrier = GUARD) -> None:
         self.inner = inner
         self.name = inner.name
-        self.copy_requirements(inner)
+        self.requirements = inner.requirements
         super().__init__(scenario, num_worlds, barrier)
 
     def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
-        """Reset the policy inside, too."""
+        """Reset the inner policy, too."""
         super().reset(seed, worlds)
         self.inner.reset(seed, worlds)
 
     def decide(self, percept: Percept) -> Float32:
-        """The policy's actions of shape (world, vehicle, 2), changed where they are not safe."""
+        """Actions of the inner policy, shape (world, vehicle, 2), changed where they are not safe."""
         self.inner.active = self.active
         self.inner.update_memory(percept)
         action = self.inner.decide(percept)
-        guard_all(
-            self.active, self.model.own, self.barrier, self.limits, self.gain, self.memory, self.planes,
-            action,
-        )  # fmt: skip
+        guard_all(self.active, self.model.own, self.barrier, self.limits, self.gain, self.memory, self.planes, action)
         self.clamps[...] = self.inner.clamps
         return action
 
     def record_action(self, action: Float32) -> None:
-        """The policy inside is told too."""
+        """Report the actions to the inner policy, too."""
         super().record_action(action)
         self.inner.record_action(action)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
-        """That of the policy inside, too."""
+        """Snapshots of both."""
         return super().snapshot() | parts_of(inner=self.inner)
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """The policy inside, too."""
+        """Restore both."""
         super().restore(snapshot)
         self.inner.restore(part_of(snapshot, "inner"))
 
 
 @compiled
 def coming_velocity(w: int, i: int, action: Float32, own: DeadReckoning, memory: Surroundings) -> tuple[float, float]:
-    """The velocity in the vehicle's map [m/s] that an action leads to at the next decision, in still water."""
+    """Velocity in the map [m/s] that an action leads to at the next decision, in still water."""
     _, _, psi, u, v, _ = reckoned(memory.motion[w, i], action, own)
     c, s = cos_sin(psi)
     return to_map_axes(c * u - s * v, s * u + c * v, memory.pose[w, i])
@@ -82,10 +79,10 @@ def coming_velocity(w: int, i: int, action: Float32, own: DeadReckoning, memory:
 
 @compiled
 def guard_all(
-    worlds: Bool, own: DeadReckoning, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings, planes: Float64,
-    action: Float32,
+    worlds: Bool, own: DeadReckoning, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings,
+    planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
-    """Replace actions that are not safe. ``action`` is changed, and whether the filter acts is written."""
+    """Replace unsafe actions in place; ``memory.filtered`` records where the filter acts."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if not worlds[w] or memory.begun[w, i] == 0.0:

@@ -1,8 +1,8 @@
-"""The velocity nearest to a wished one that keeps to half-planes; where none does, the one that violates them least.
+"""The velocity nearest to a desired one within half-planes; where none exists, the one of least violation.
 
 The linear programs of van den Berg, Guy, Lin and Manocha, Reciprocal n-body collision avoidance, ISRR 2009 (Springer
-2011), section 5: one half-plane after the other, in the order given, a velocity that violates one moves to its border.
-Nothing is drawn at random, and both answers are unique, so that the order changes them by rounding alone.
+2011), section 5: one half-plane after the other, in the order given, a velocity that violates it moves to its border.
+No step is random, and both solutions are unique, so that the order changes them by rounding alone.
 """
 
 import math
@@ -10,35 +10,34 @@ import math
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Float64
 
-TOLERANCE = 1e-9
-"""Largest violation with which a half-plane counts as kept [m/s]; assumed: far above rounding, below any use."""
+TOLERANCE = 1e-9  # largest violation of a satisfied half-plane [m/s]. Assumed: far above rounding, below any use.
 _PARALLEL = 1e-12
-"""Sine of the angle below which two borders are parallel; assumed: their crossing would lie beyond any speed."""
+"""Sine of the angle below which two borders are parallel. Assumed: their crossing would be beyond any speed."""
 
 
 @compiled
 def nearest_velocity(
     w_x: float, w_y: float, planes: Float64, num: int, firm: int, limit: float
 ) -> tuple[float, float, float]:
-    """The velocity nearest to a wished one, within a speed limit, for which ``n_x v_x + n_y v_y <= b`` for each plane.
+    """The velocity nearest to a desired one, within a speed limit, with ``n_x v_x + n_y v_y <= b`` for each plane.
 
-    Where there is none, the largest violation ``n_x v_x + n_y v_y - b`` of the planes that are not firm becomes as
-    small as can be; of the velocities that do that, the nearest to the wished one. The time grows with the square of
-    the number of planes, and with its cube where there is none.
+    If none exists, the largest violation ``n_x v_x + n_y v_y - b`` of the planes that are not firm is minimized, and of
+    the velocities that minimize it the nearest is taken. The time grows with the square of the number of planes, and
+    with its cube if no velocity satisfies them.
 
     Args:
-        w_x: wished velocity [m/s], in any frame.
-        w_y: and across.
+        w_x: desired velocity [m/s], in any frame.
+        w_y: its other component.
         planes: n_x, n_y and b [m/s] of each, float64, shape (at least ``num``, 3). Normals have length 1, or a length
-            near it that weighs the plane's violation; the zero vector is no normal, and its row is passed over.
-        num: how many rows count.
-        firm: how many of these, the first, are not to be violated for the others' sake. Where they can't be kept
+            near it that weighs the plane's violation; rows with a zero normal are ignored.
+        num: number of rows that count.
+        firm: number of first rows that must not be violated in favour of the others. If they can't be satisfied
             together, they count like the others.
         limit: largest speed, above 0 [m/s].
 
     Returns:
-        The velocity (v_x, v_y) [m/s], and the largest violation [m/s], 0 where every plane is kept. To
-        ``TOLERANCE``.
+        The velocity (v_x, v_y) [m/s], and the largest violation [m/s], 0 where every plane is satisfied to
+            ``TOLERANCE``.
     """
     v_x, v_y, violated = _program(w_x, w_y, False, planes, num, -1, firm, 0.0, limit)
     if violated == num:
@@ -59,19 +58,16 @@ def nearest_velocity(
 
 @compiled
 def _excess(v_x: float, v_y: float, planes: Float64, i: int) -> float:
-    """By how much a velocity violates a plane [m/s]; negative where it keeps it."""
+    """Violation of a plane by a velocity [m/s]; negative where it is satisfied."""
     return planes[i, 0] * v_x + planes[i, 1] * v_y - planes[i, 2]
 
 
 @compiled
 def _row(planes: Float64, j: int, rival: int, firm: int, slack: float) -> tuple[float, float, float, bool]:
-    """The unit normal and bound of a plane, or of those velocities that violate it no more than they do a rival.
+    """Unit normal and bound of a plane, or of the velocities that violate it no more than they violate a rival.
 
-    ``rival``: index of the other plane, -1 for none. Planes before ``firm`` stay as they are; the others are moved
-    outwards by ``slack`` [m/s].
-
-    Returns:
-        n_x, n_y, b, and False where there is no border.
+    ``rival`` is the index of the other plane, -1 for none. Planes from ``firm`` on are moved outwards by ``slack``
+    [m/s]. The fourth value is False if no border exists.
     """
     n_x, n_y, b = planes[j, 0], planes[j, 1], planes[j, 2]
     if j >= firm:
@@ -88,13 +84,11 @@ def _row(planes: Float64, j: int, rival: int, firm: int, slack: float) -> tuple[
 def _program(
     c_x: float, c_y: float, far: bool, planes: Float64, num: int, rival: int, firm: int, slack: float, limit: float
 ) -> tuple[float, float, int]:
-    """The velocity that is nearest to c, or lies farthest along it, within the limit and the planes.
+    """The velocity nearest to c, or farthest along it, within the limit and the planes.
 
-    c is what is aimed at [m/s]: with ``far`` the farthest along it, else the nearest to it; ``rival``, ``firm`` and
-    ``slack`` as in ``_row``.
-
-    Returns:
-        The velocity [m/s], and how many planes were kept before one that can't be: ``num`` where all are.
+    c is the target [m/s]: the farthest along it with ``far``, else the nearest to it; ``rival``, ``firm`` and ``slack``
+    as in ``_row``. Returns the velocity [m/s] and the number of planes satisfied before an infeasible one, ``num`` if
+    all are.
     """
     size = math.sqrt(c_x * c_x + c_y * c_y)
     v_x, v_y = (limit * c_x / size, limit * c_y / size) if (far or size > limit) and size > 0.0 else (c_x, c_y)
@@ -112,12 +106,10 @@ def _program(
 def _along_border(
     c_x: float, c_y: float, far: bool, planes: Float64, i: int, rival: int, firm: int, slack: float, limit: float
 ) -> tuple[float, bool]:
-    """Where on the border of plane i, counted from its foot along (-n_y, n_x), the best velocity lies [m/s].
+    """Position of the best velocity on the border of plane i [m/s], and whether it exists.
 
-    The planes before i are kept; the rest as in ``_program``.
-
-    Returns:
-        The place, and whether there is one.
+    The position counts from the border's foot along (-n_y, n_x). The planes before i are satisfied; arguments as in
+    ``_program``.
     """
     n_x, n_y, b, _ = _row(planes, i, rival, firm, slack)
     if b * b > limit * limit:

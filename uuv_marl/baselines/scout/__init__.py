@@ -1,1 +1,1 @@
-"""``scout``: the safest hand-made law here."""
+"""``scout``: the safest hand-made controller."""

@@ -1,12 +1,11 @@
-"""``carrot``: ``scout`` to a goal at rest at a set speed, to starboard of its way, or in its turn.
+"""``carrot``: ``scout`` to a goal at rest at a set speed, to starboard of its path.
 
-Afar from a goal at rest ``scout`` pulls so hard that pushes from neighbours count for nothing. A carrot is a reference
-a little ahead on the way, with a velocity. To keep to starboard is rule 9 of the COLREGs (in a narrow channel) and
-rule 14 (who meet head-on pass port to port).
+Far from a goal at rest ``scout``'s pull is so strong that pushes from neighbours have no effect. A carrot is a moving
+reference a little ahead on the path. Keeping to starboard is rule 9 of the COLREGs (narrow channels) and rule 14
+(vessels that meet head-on pass port to port).
 """
 
 import dataclasses
-from typing import ClassVar
 
 import numpy as np
 
@@ -22,12 +21,12 @@ _TUNED = tuned("carrot")
 
 
 class Carrot(Scout):
-    """``scout`` behind a carrot on the straight way to a goal at rest; a reference that moves is followed as ever.
+    """``scout`` behind a carrot on the straight line to a goal at rest; a moving reference is followed as by ``scout``.
 
     Args:
         speed: of the carrot [m/s]. Tuned with the preset ``gap``, as are the next two.
-        ahead_m: how far ahead it is [m]; nearer to the goal there is none.
-        right_m: how far to starboard of the point that it leads to [m].
+        ahead_m: its distance ahead [m]; nearer to the goal the reference is the goal.
+        right_m: distance to starboard of the target point [m].
         preset: as for ``scout``, and so are ``gains`` and ``barrier``.
     """
 
@@ -40,11 +39,11 @@ class Carrot(Scout):
         self.speed, self.ahead_m, self.right_m = speed, ahead_m, right_m
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Remember a percept whose reference is the carrot."""
+        """Update the memory from a percept whose reference is the carrot."""
         super().remember(self.with_carrot(percept), worlds)
 
     def with_carrot(self, percept: Percept) -> Percept:
-        """The percept with the carrot in the place of a goal at rest."""
+        """The percept with the carrot in place of a goal at rest."""
         with_carrot, (to, left) = (
             dataclasses.replace(percept, flat=percept.flat.copy()),
             self._goal_and_distance(percept),
@@ -56,20 +55,20 @@ class Carrot(Scout):
         return with_carrot
 
     def _goal_and_distance(self, percept: Percept) -> tuple[Float32, Float32]:
-        """A vector to lead along [m], shape (world, vehicle, 2), and how far it is to the goal."""
+        """Vector to the target point [m], shape (world, vehicle, 2), and distance of the goal [m], (world, vehicle)."""
         goal = percept["reference"].copy()
         return goal, np.hypot(goal[..., 0], goal[..., 1])
 
 
 class CarrotInformed(Carrot):
-    """``carrot`` on a free way that it is told: for tasks with the channel ``way``.
+    """``carrot`` on a given collision-free path: for tasks with the channel ``path``.
 
     Args:
-        waits: whether to stay until it is one's turn, where the task has turns.
-        speed: of the carrot [m/s]: that of l(t) in the paper, as nothing has to be found out.
+        waits: whether a vehicle without right of way stays, where the task has right of way.
+        speed: of the carrot [m/s]: that of l(t) in the paper, as no exploration is needed.
     """
 
-    channels: ClassVar[tuple[str, ...]] = ("path",)
+    requirements = Carrot.requirements._replace(channels=("path",))
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, waits: bool = False, speed: float = 4.0,
@@ -79,7 +78,7 @@ class CarrotInformed(Carrot):
         self.waits = waits and "right_of_way" in self.layout.starts
 
     def with_carrot(self, percept: Percept) -> Percept:
-        """Likewise; who waits has a reference at rest where it is."""
+        """The percept with the carrot on the path; a vehicle that waits has a reference at rest at its position."""
         with_carrot = super().with_carrot(percept)
         if self.waits:
             stays = percept["right_of_way"][..., 0] == 0.0
@@ -91,6 +90,6 @@ class CarrotInformed(Carrot):
 
 
 def _unit(vectors: Float32) -> Float32:
-    """Their directions, shape (..., 2)."""
+    """Unit vectors, shape (..., 2)."""
     length = np.maximum(np.hypot(vectors[..., 0], vectors[..., 1]), 1e-6)
     return (vectors / length[..., None]).astype(np.float32)

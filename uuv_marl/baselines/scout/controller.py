@@ -1,7 +1,7 @@
-"""The strongest hand-made law here: it remembers, flows round obstacles before they are near, and keeps to the filter.
+"""``Scout``: the strongest hand-made controller, with a memory, early avoidance and the safety filter.
 
-A vehicle's wished velocity is l(t)'s velocity, a pull to l(t), and pushes from near neighbours. This velocity is bent
-round remembered obstacles and made safe; the vehicle then steers to it.
+A vehicle's desired velocity is l(t)'s velocity, a pull to l(t), and pushes from near neighbours. It is bent around
+remembered obstacles and made safe; the vehicle then steers to it.
 """
 
 import math
@@ -26,15 +26,15 @@ from uuv_marl.types import Bool, Float32, Float64
 
 
 class Scout(Filtered):
-    """Feed-forward and pull, pushes among near neighbours, a flow round remembered obstacles, and the safety filter.
+    """Feed-forward and pull, pushes among near neighbours, a flow around remembered obstacles, and the safety filter.
 
     Args:
-        preset: name of the set of numbers, of ``PRESETS``.
-        gains: of the wished velocity, instead of the preset's.
-        barrier: margins and rates of the filter, instead of the preset's.
+        preset: name of a preset, of ``PRESETS``.
+        gains: replace the preset's.
+        barrier: margins and rates of the safety filter; replace the preset's.
 
     Raises:
-        PolicyError: no preset has that name.
+        PolicyError: the preset is unknown.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Scout(Filtered):
 
     @property
     def memory_s(self) -> float:
-        """For how long a neighbour is remembered that is heard no more [s]."""
+        """Time for which an undetected neighbour is remembered [s]."""
         return float(self.gains.memory_s)
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
@@ -63,7 +63,7 @@ class Scout(Filtered):
         return action
 
     def _grown(self) -> ScoutGains:
-        """The gains for as many vehicles as the swarm has, all float: else compiled code would be made anew."""
+        """The gains for the swarm's size, all float: other types would compile the kernels again."""
         gains, g = ScoutGains(*map(float, self.gains)), self._growth
         return gains._replace(
             pull=gains.pull / g, pull_at_rest=gains.pull_at_rest * math.sqrt(g), push_at_rest=gains.push_at_rest * g,
@@ -73,7 +73,7 @@ class Scout(Filtered):
 
 @compiled
 def wary(g: ScoutGains, share: float) -> ScoutGains:
-    """Gains of a vehicle that doubts: pull and push, changed. ``share``: how much it doubts, 0 to 1."""
+    """Gains at an uncertainty ``share`` from 0 to 1: pull and push change."""
     pull, push = math.exp(share * g.pull_if_uncertain), math.exp(share * g.push_if_uncertain)
     return ScoutGains(
         g.pull * pull, g.push * push, g.push_range, g.pull_at_rest, g.push_at_rest, g.together, g.behind_m, g.steering,
@@ -83,7 +83,7 @@ def wary(g: ScoutGains, share: float) -> ScoutGains:
 
 @compiled
 def desired_velocity(w: int, i: int, g: ScoutGains, memory: Surroundings) -> tuple[float, float]:
-    """The velocity that a vehicle wishes where there are no obstacles, in its map [m/s]."""
+    """Desired velocity without regard to obstacles, in the vehicle's map [m/s]."""
     pose, reference, speed = memory.pose[w, i], memory.reference[w, i], memory.reference_speed[w, i]
     pull, push, together = g.pull, g.push, g.together
     if reference[2] == 0.0 and reference[3] == 0.0:
@@ -101,7 +101,7 @@ def desired_velocity(w: int, i: int, g: ScoutGains, memory: Surroundings) -> tup
 def pushed(
     w_x: float, w_y: float, w: int, i: int, push: float, push_range: float, memory: Surroundings
 ) -> tuple[float, float]:
-    """A wished velocity [m/s] with pushes away from near neighbours, as ``ScoutGains`` has them."""
+    """A desired velocity [m/s] with pushes away from near neighbours, as ``ScoutGains`` defines them."""
     for k in range(memory.known.shape[2]):
         away = max(memory.away[w, i, k], 1e-6)
         if away < push_range:
@@ -113,11 +113,11 @@ def pushed(
 
 @compiled
 def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, memory: Surroundings) -> tuple[float, float]:
-    """A wished velocity [m/s] bent round the obstacles ahead, as an ideal fluid flows round cylinders.
+    """A desired velocity [m/s] bent around obstacles ahead, as an ideal fluid flows around cylinders.
 
     The modulation of Khansari-Zadeh and Billard, A dynamical system approach to realtime obstacle avoidance, Autonomous
     Robots 32 (2012), for discs: with (R / r)^2, R the radius and the margin, r the distance of the centre, the velocity
-    towards a disc shrinks by that share, and that past it grows. Each disc bends what the one before has left.
+    towards a disc shrinks by that share, and that past it grows. Each disc bends the result of the previous one.
     """
     for d in range(memory.score.shape[2]):
         if memory.score[w, i, d] < CONFIRMED:
@@ -136,10 +136,7 @@ def modulated(w_x: float, w_y: float, w: int, i: int, barrier: Barrier, memory: 
 
 @compiled
 def _lead(w: int, i: int, share: float, limits: Limits, memory: Surroundings, action: Float32) -> None:
-    """Change an action so that it acts in spite of actuators that lag or are weak.
-
-    ``share``: of lag and weakness that is made up for.
-    """
+    """Change an action so that it compensates a ``share`` of actuator lag and weakness."""
     damping = limits.yaw_damping * memory.motion[w, i, 2]
     torque = lead(w, i, 1, min(max(action[w, i, 1] - damping, -1.0), 1.0), share, memory) + damping
     thrust = lead(w, i, 0, float(action[w, i, 0]), share, memory)
@@ -152,7 +149,7 @@ def decide_all(
     worlds: Bool, period: float, g: ScoutGains, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings,
     planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
-    """The law for every vehicle."""
+    """Write every vehicle's action."""
     adapts = g.pull_if_uncertain != 0.0 or g.push_if_uncertain != 0.0
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):

@@ -1,4 +1,4 @@
-"""The numbers of ``scout``: its gains, and the sets of numbers that ship."""
+"""Gains of ``scout`` and its presets."""
 
 from typing import NamedTuple
 
@@ -8,43 +8,42 @@ from uuv_marl.baselines.safety.barrier import Barrier, with_numbers
 
 
 class ScoutGains(NamedTuple):
-    """Gains of the wished velocity and of memory, for all scenarios, swarm sizes, echoes and decision periods."""
+    """Gains of the desired velocity and of memory, for all scenarios, swarm sizes, echoes and decision periods."""
 
     pull: float = 0.05
-    """To l(t) [1/s], for up to 54 vehicles; divided by g = sqrt(n / 54) for more, which are spread farther."""
+    """To l(t) [1/s], for up to 54 vehicles; divided by g = sqrt(n / 54) for larger, wider swarms."""
     push: float = 10.0
-    """Away from a neighbour at no distance [m/s], falling linearly to none at ``push_range``."""
+    """Away from a neighbour at distance 0 [m/s], falling linearly to 0 at ``push_range``."""
     push_range: float = 12.0
-    """Where pushes end [m]: so near, hearing is mutual, and pushes cancel over the swarm."""
+    """Range of pushes [m]: so near, detection is mutual, and pushes cancel over the swarm."""
     pull_at_rest: float = 4.0
     """Factor of the pull while l(t) rests [1]; times sqrt(g) for larger swarms."""
     push_at_rest: float = 2.0
-    """Factor of the push while l(t) rests [1]; times g for larger swarms: those outside press the others together."""
+    """Factor of the push while l(t) rests [1]; times g for larger swarms, which are pressed from outside."""
     together: float = 0.0
-    """While l(t) moves, to l(t) from the mean place of the neighbours that a vehicle hears [1/s]; divided by g^3, as in
-    a large swarm they are a small part of it. All go the same way, and the swarm is not pressed together."""
+    """While l(t) moves, pull to it from the mean position of detected neighbours [1/s]; divided by g^3, as in a large
+    swarm they are a small part of it. The swarm moves as a whole, without being pressed together."""
     behind_m: float = 0.0
-    """How far behind a moving l(t) to go [m]: a swarm coasts on for about 2 m where l(t) stops."""
+    """Distance behind a moving l(t) to aim at [m]: a swarm coasts on for about 2 m where l(t) stops."""
     steering: float = 1.0
-    """Factor of the force that follows the wished velocity [1]. Less is calmer, and bears actuators that lag."""
+    """Factor of the force that follows the desired velocity [1]. Less is calmer, and tolerates actuator lag."""
     memory_s: float = MEMORY_S
-    """For how long a neighbour is remembered that is heard no more [s]."""
+    """Time for which an undetected neighbour is remembered [s]."""
     lead: float = 0.0
-    """Share of its actuators' lag and weakness that a vehicle makes up for, as it sees them (``memory.actuators``) [1].
-    Not with a rudder, whose angle is chosen later."""
+    """Share of identified actuator lag and weakness that is compensated (``memory.actuators``) [1]. Not with a rudder,
+    whose angle is chosen later."""
     pull_if_uncertain: float = 0.0
-    """While l(t) moves, added to the logarithm of the pull of a vehicle that doubts in full (``memory.doubt``); less in
-    proportion [1]."""
+    """While l(t) moves, added to the logarithm of the pull at full uncertainty (``memory.uncertainty``), and in
+    proportion below [1]."""
     push_if_uncertain: float = 0.0
-    """The same for its push [1]: who knows less where the others are keeps farther from them."""
+    """The same for the push [1]: a vehicle that knows less about neighbours' positions keeps farther from them."""
 
 
 class Preset(NamedTuple):
-    """A set of numbers for ``scout``."""
+    """Gains and safety filter of ``scout``."""
 
     gains: ScoutGains
     barrier: Barrier = Barrier()
-    """Margins and rates of the safety filter."""
 
 
 _PLUS = ScoutGains(
@@ -54,13 +53,13 @@ _LEAD = _PLUS._replace(pull_at_rest=6.0, push_at_rest=3.0, memory_s=3.0, lead=1.
 DEFAULT_PRESET = "base"
 PRESETS = {
     "base": Preset(ScoutGains()),
-    "plus": Preset(_PLUS),  # a swarm that moves as a whole, longer pushes, silent neighbours remembered twice as long
-    "lead": Preset(_LEAD),  # makes up for actuators that lag, as far as a vehicle sees it, and is softer at rest
-    # Keeps farther from others where it doubts, and from obstacles: with 13.5 m the smallest distance of ``lead`` was
-    # 12.55 m on 80 tuning seeds, and the paper states 12.63 m.
+    "plus": Preset(_PLUS),  # a swarm that moves as a whole, longer pushes, twice the memory of undetected neighbours
+    "lead": Preset(_LEAD),  # compensates identified actuator lag, and is softer at rest
+    # Keeps farther from neighbours where uncertain, and from obstacles: with 13.5 m the smallest distance of ``lead``
+    # was 12.55 m on 80 tuning seeds, and the paper states 12.63 m.
     "wary": Preset(_LEAD._replace(pull_if_uncertain=-0.7, push_if_uncertain=1.1), Barrier(obstacle_m=13.7)),
     "closed": Preset(*with_numbers(tuned("scout"), ScoutGains(), Barrier())),  # for water with walls
-    "gap": Preset(*with_numbers(tuned("carrot"), ScoutGains(), Barrier())),  # for gaps through which others come
+    "gap": Preset(*with_numbers(tuned("carrot"), ScoutGains(), Barrier())),  # for gaps with oncoming vehicles
 }
-"""By name. ``closed`` and ``gap`` are tuned; the others were found by hand on tuning seeds, ``lead`` and ``wary`` on
-disturbed ones too (docs/policies.md)."""
+"""Presets by name. ``closed`` and ``gap`` are tuned; the others were found by hand on tuning seeds, ``lead`` and
+``wary`` on disturbed ones too (docs/policies.md)."""

@@ -1,8 +1,8 @@
-"""``nearest_target``: searches a box for silent targets, and keeps near the nearest that no other vehicle is nearer to.
+"""``nearest_target``: searches a box for silent targets, and follows the nearest that no other vehicle is nearer to.
 
-It has one target, which it remembers for a while as it was heard last, moving on. Without one it searches: straight on
-and mirrored at the sides of the box, or to and fro in lanes, one for each vehicle. Pushes among near neighbours and the
-safety filter are as in ``scout``.
+It tracks one target, which it remembers for a while after its last detection, moving on. Without one it searches:
+straight on with reflection at the sides of the box, or to and fro in lanes, one for each vehicle. Pushes among near
+neighbours and the safety filter are as in ``scout``.
 """
 
 import dataclasses
@@ -18,73 +18,59 @@ from uuv_marl.baselines.policy import Limits, PolicyError, tuned
 from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
 from uuv_marl.baselines.safety.filtered import Filtered
 from uuv_marl.baselines.scout.controller import pushed
-from uuv_marl.percept import Percept, Starts
+from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.views import Fields, fields
+from uuv_marl.sim.views import fields
 from uuv_marl.types import Bool, Float32, Float64
 
 
 class SeekerGains(NamedTuple):
-    """Free parameters. Those by default were found by hand; the policy has tuned ones."""
+    """Free parameters. The defaults were found by hand; the policy has tuned ones."""
 
-    speed: float = 5.0
-    """Of a search [m/s]."""
-    rate: float = 0.5
-    """Speed towards the target, beside its own, over the distance to where one stays behind it [1/s]."""
-    stay_m: float = 12.0
-    """Distance to stay from the target [m]."""
-    claim_m: float = 45.0
-    """A target is another's if that one is nearer to it, and so near [m]."""
-    lost_s: float = 8.0
-    """For how long a target is followed that is heard no more [s]."""
-    edge_m: float = 60.0
-    """A search turns back so far from the box's side [m]."""
-    push: float = 10.0
-    """Away from a neighbour at no distance [m/s]."""
-    push_range: float = 12.0
-    """Where pushes end [m]."""
-    steering: float = 1.0
-    """Factor of the force that follows the wished velocity [1]."""
+    speed: float = 5.0  # of a search [m/s]
+    rate: float = 0.5  # speed towards the target, beside its own, over the distance to the point behind it [1/s]
+    stay_m: float = 12.0  # distance to keep from the target [m]
+    claim_m: float = 45.0  # a target is another vehicle's if that one is nearer to it, and within this distance [m]
+    lost_s: float = 8.0  # time for which an undetected target is followed [s]
+    edge_m: float = 60.0  # distance from the box's side at which a search turns back [m]
+    push: float = 10.0  # away from a neighbour at distance 0 [m/s]
+    push_range: float = 12.0  # distance at which pushes end [m]
+    steering: float = 1.0  # factor of the force that follows the desired velocity [1]
 
 
 class TrackedTarget(NamedTuple):
-    """The target that a vehicle follows, in its map, and how it searches."""
+    """The target that a vehicle follows, in its map, and its search."""
 
-    target: Annotated[Float64, "world vehicle 4", "Place [m] and velocity [m/s] of its target."]
-    track_timeout_s: Annotated[
-        Float64, "world vehicle", "For how long it is followed yet if it is not heard again [s]."
-    ]
-    search: Annotated[
-        Float64, "world vehicle 2", "Direction of its search in the box, or in lanes that of x, and the lane."
-    ]
+    target: Annotated[Float64, "world vehicle 4", "Position [m] and velocity [m/s] of its target."]
+    track_timeout_s: Annotated[Float64, "world vehicle", "Time left to follow it without detection [s]."]
+    search: Annotated[Float64, "world vehicle 2", "Direction of its search in the box; in lanes, of x, and the lane."]
 
 
 SeekerMemory = with_surroundings("SeekerMemory", TrackedTarget)
-_ALPHA, _BETA = 0.8, 0.5
-"""Gains by which an echo corrects a target's place and velocity [1]. Assumed."""
+_ALPHA, _BETA = 0.8, 0.5  # gains by which an echo corrects a target's position and velocity [1]. Assumed.
 _GATE_M, _GATE_MPS = 8.0, 4.0
-"""An echo so near to where the target is expected is its own, and farther by this for the time unheard. Assumed."""
+"""Distance from the predicted target within which an echo is its own, and its growth with the time undetected.
+Assumed."""
 _SILENT_S, _GOES_MPS = 1.2, 0.5
-"""Unheard for so long, a target is turned to; slower than this, one stays this side of it, not behind it. Assumed."""
-_AHEAD_M = 40.0
-"""Who is beside its lane comes back to it so far ahead [m]. Assumed."""
+"""Time undetected after which a vehicle moves to the target; speed from which it stays behind it. Assumed."""
+_AHEAD_M = 40.0  # distance ahead at which a vehicle returns to its lane [m]. Assumed.
 
 
 class NearestTarget(Filtered):
-    """Search a box, then keep near the nearest target heard that no other is nearer to.
+    """Search a box, then stay near the nearest detected target that no other vehicle is nearer to.
 
     Args:
         lanes: whether to search in lanes across the box, one for each vehicle, instead of straight on.
-        gains: free parameters, instead of those that were tuned for this search.
-        barrier: margins and rates of the filter, instead of the tuned ones.
+        gains: free parameters; replace those tuned for this search.
+        barrier: margins and rates of the safety filter; replace the tuned ones.
 
     Raises:
-        PolicyError: the scenario's task tells nothing of a box.
+        PolicyError: the scenario's task has no box.
     """
 
     Memory: ClassVar[type[Any] | None] = SeekerMemory
-    identity: ClassVar[bool | str] = "lanes"
+    requirements = Filtered.requirements._replace(identity="lanes")
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, gains: SeekerGains | None = None,
@@ -95,7 +81,7 @@ class NearestTarget(Filtered):
         self.gains = gains or tuned_gains
         if "box" not in self.layout.starts:
             raise PolicyError(
-                f"nearest_target searches a box, of which task {scenario.task.name!r} tells nothing; run it on "
+                f"nearest_target searches a box, which task {scenario.task.name!r} does not have; run it on "
                 "silent_targets"
             )
         self._half_m = 0.5 * scenario.task_numbers.side_m
@@ -104,7 +90,7 @@ class NearestTarget(Filtered):
         self._surroundings, self._track = Surroundings(*self.memory[:split]), TrackedTarget(*self.memory[split:])
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Remember the targets, and a percept without them, since they are nothing to go round."""
+        """Update tracks from the echoes, and the surroundings without echoes, since targets are not obstacles."""
         seen, period = dataclasses.replace(percept, flat=percept.flat.copy()), self.model.own.period_s
         for name in ("echo", "echo_range", "echo_position"):
             seen[name][:] = 0.0
@@ -127,7 +113,7 @@ class NearestTarget(Filtered):
 
 @compiled
 def claimed(w: int, i: int, x: float, y: float, claim_m: float, memory: Surroundings) -> bool:
-    """Whether another vehicle is nearer to a target at (x, y) in the map, and near enough."""
+    """Whether another vehicle is nearer to a target at (x, y) in the map, and within ``claim_m``."""
     least = min(math.hypot(memory.pose[w, i, 0] - x, memory.pose[w, i, 1] - y), claim_m)
     for k in range(memory.known.shape[2]):
         if (
@@ -142,9 +128,9 @@ def claimed(w: int, i: int, x: float, y: float, claim_m: float, memory: Surround
 def _detected_target(
     w: int, i: int, gate: float, see: Fields, g: SeekerGains, memory: Surroundings, track: TrackedTarget
 ) -> tuple[float, float, bool]:
-    """Place in the map of the target heard that a vehicle follows, or is to follow now [m], and whether there is one.
+    """Position in the map of the detected target to follow [m], and whether one exists.
 
-    ``gate``: how far it may be from where it is expected [m]; infinite where nothing is followed.
+    ``gate``: largest distance from its predicted position [m]; infinite where no target is tracked.
     """
     pose, (x, y, is_detected), best = memory.pose[w, i], (0.0, 0.0, False), gate
     from_x, from_y = (pose[0], pose[1]) if gate == math.inf else (track.target[w, i, 0], track.target[w, i, 1])
@@ -162,7 +148,7 @@ def stay_behind(
     flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
     memory: Surroundings, track: TrackedTarget,
 ) -> None:  # fmt: skip
-    """Take the echoes, all of which are targets', into what vehicles follow; and turn searches back."""
+    """Update tracks with the echoes, all of which are targets', and turn searches back."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1] if worlds[w] else 0):
@@ -189,7 +175,7 @@ def stay_behind(
 
 @compiled
 def place_in_box(w: int, i: int, see: Fields, box: Float32) -> tuple[float, float]:
-    """Where a vehicle is in the box, from its middle, which is the reference [m]."""
+    """Position of a vehicle in the box, from its centre, which is the reference [m]."""
     c, s = float(box[w, i, 0]), float(box[w, i, 1])
     x, y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     return s * y - c * x, -s * x - c * y
@@ -197,7 +183,7 @@ def place_in_box(w: int, i: int, see: Fields, box: Float32) -> tuple[float, floa
 
 @compiled
 def _turn_back(w: int, i: int, most: float, lanes: int, see: Fields, box: Float32, track: TrackedTarget) -> None:
-    """Begin a search, along the bow or the lane; ``most`` from the middle [m] mirror it, or take another lane."""
+    """Begin a search along the bow or the lane; beyond ``most`` from the centre [m], reflect it or change the lane."""
     search = track.search[w, i]
     if search[0] == 0.0 and search[1] == 0.0:
         search[0], search[1] = float(box[w, i, 0]), float(box[w, i, 1])
@@ -216,7 +202,7 @@ def _searching(
     w: int, i: int, half_m: float, lanes: int, see: Fields, box: Float32, speed: float, memory: Surroundings,
     track: TrackedTarget,
 ) -> tuple[float, float]:  # fmt: skip
-    """The velocity that a search wishes, in the map [m/s]."""
+    """Desired velocity of a search, in the map [m/s]."""
     x, y = track.search[w, i, 0], track.search[w, i, 1]
     if lanes:
         off = (2.0 * y / lanes - 1.0) * half_m - place_in_box(w, i, see, box)[1]
@@ -228,7 +214,7 @@ def _searching(
 
 @compiled
 def _keeping(w: int, i: int, g: SeekerGains, memory: Surroundings, track: TrackedTarget) -> tuple[float, float]:
-    """The velocity that keeps a vehicle behind its target, or leads to one that isn't heard, in the map [m/s]."""
+    """Desired velocity behind the target, or to one that is not detected, in the map [m/s]."""
     goal, pose = track.target[w, i], memory.pose[w, i]
     x, y, v_x, v_y = goal[0] - pose[0], goal[1] - pose[1], goal[2], goal[3]
     b_x, b_y = (v_x, v_y) if math.hypot(v_x, v_y) > _GOES_MPS else (x, y)
@@ -240,9 +226,10 @@ def _keeping(w: int, i: int, g: SeekerGains, memory: Surroundings, track: Tracke
 @compiled
 def seek(
     flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
-    barrier: Barrier, limits: Limits, gain: float, memory: Surroundings, track: TrackedTarget, planes: Float64, action: Float32,
+    barrier: Barrier, limits: Limits, gain: float, memory: Surroundings, track: TrackedTarget, planes: Float64,
+    action: Float32,
 ) -> None:  # fmt: skip
-    """The law for every vehicle."""
+    """Write every vehicle's action."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):

@@ -44,7 +44,7 @@ class Axis(NamedTuple):
 
     def concerns(self, policy: str) -> bool:
         """Whether the policy uses the disturbed channels."""
-        return not self.channels or not self.channels.isdisjoint(policy_class(policy).channels)
+        return not self.channels or not self.channels.isdisjoint(policy_class(policy).requirements.channels)
 
 
 def _axis(name: str, data: dict[str, Any]) -> Axis:

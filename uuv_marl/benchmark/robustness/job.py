@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from uuv_marl.atomic import replacing
-from uuv_marl.baselines import make, with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.benchmark.frame import import_pandas
 from uuv_marl.benchmark.robustness.axes import AXES, CALM, overrides
 from uuv_marl.benchmark.runner import distinct_names
@@ -101,7 +101,7 @@ def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> P
             raise ScenarioError(f"axis {axis} has the levels {levels}, and none of them is to be run; give --level")
     planned = cells(plan)
     for cell in planned:
-        make(
+        make_policy(
             cell.case.policy, with_policy_requirements(cell.case.policy, cell.case.load())
         )  # raises now, not after hours
     suite = Suite(folder / "cells", traces=False)

@@ -1,1 +1,1 @@
-"""What disturbs a world: currents, late and wrong sonar, messages, lags and faults. ``sea.py`` is the front."""
+"""Disturbances: currents, sonar delays and errors, messages, lags and faults; ``disturbances.py`` is the interface."""

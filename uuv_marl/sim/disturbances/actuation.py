@@ -1,6 +1,6 @@
-"""What pushes a vehicle, as it really is: lags, a share of yaw authority, numbers off the scenario's, faults.
+"""Imperfect actuation: lags, reduced yaw authority, model mismatch and faults.
 
-A fault breaks the thruster, the yaw torque or a sonar array of some vehicles, or loses them, for a time.
+A fault degrades the thruster, the yaw torque or a sonar array of some vehicles for a time, or loses the vehicles.
 """
 
 import math
@@ -23,43 +23,43 @@ from uuv_marl.types import Bool, Float64, Int64
 THRUSTER, YAW, ARRAY, MEMBER = range(4)
 _KINDS = {"thruster": THRUSTER, "yaw": YAW, "array": ARRAY, "member": MEMBER}
 _NEVER = 2**62
-"""A control hold that no episode reaches."""
+"""A control step beyond every episode."""
 PLANT = len(Plant._fields)
 
 
 class Actuation(NamedTuple):
-    """Numbers of a scenario's lags, authority and faults."""
+    """Constants of a scenario's lags, yaw authority and faults."""
 
     thrust_half: float
-    """Share of the difference between asked and given thrust that remains after half an integration step."""
+    """Share of the difference between commanded and actual thrust that remains after half an integration step."""
     thrust_whole: float
-    """Share that remains of the thrust's difference after a whole step; 0 without a lag."""
+    """Share that remains of it after a whole step; 0 without a lag."""
     yaw_half: float
-    """Share that remains of the torque's difference after half an integration step."""
+    """The same for the torque, after half an integration step."""
     yaw_whole: float
-    """Share that remains of the torque's difference after a whole step."""
+    """The same for the torque, after a whole step."""
     yaw_authority: float
-    """Share of the torque that reaches the water."""
+    """Share of the commanded torque that acts on the vehicle."""
     kind: Int64
     """Kind of each fault: ``THRUSTER``, ``YAW``, ``ARRAY`` or ``MEMBER``, shape (fault,)."""
     efficiency: Float64
-    """What a fault leaves of thrust or torque, shape (fault,)."""
+    """Share of thrust or torque that remains under a fault, shape (fault,)."""
     array: Int64
-    """Index of the array that a fault breaks, -1 for none, shape (fault,)."""
+    """Index of the array that a fault disables, -1 for none, shape (fault,)."""
 
 
 @described
 class Hull(NamedTuple):
-    """What each vehicle is like."""
+    """Each vehicle's own parameters, forces and faults."""
 
     plants: Annotated[Float64, "world vehicle plant", "Its own ``uuv_marl.sim.vehicle.Plant``, field by field."]
     thrust: Annotated[Float64, "world vehicle", "Its thrust, as a share of the scenario's."]
     tau: Annotated[Float64, "world vehicle 2", "Thrust [N] and torque [N m] (or rudder [rad]) in the water now."]
-    broken: Annotated[Int64, "world vehicle fault 2", "Control holds from which and up to which each fault acts."]
+    broken: Annotated[Int64, "world vehicle fault 2", "First control step of each fault, and the end."]
 
 
 def actuation(scenario: Scenario) -> Actuation:
-    """The scenario's lags, authority and faults as numbers for the compiled functions."""
+    """Constants of the scenario's lags, yaw authority and faults for the compiled functions."""
     actuators, names = scenario.actuators, [array.name for array in scenario.sonar.arrays]
 
     def remains(seconds: float, lag_s: float) -> float:
@@ -79,7 +79,7 @@ def actuation(scenario: Scenario) -> Actuation:
 
 
 def sample_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, hull: Hull) -> None:
-    """The vehicles of world w's new episode, whose faults begin within ``duration_s``; ``hull`` is written."""
+    """Sample the vehicles of world w's new episode into ``hull``; faults begin within ``duration_s``."""
     hull.tau[w] = 0.0
     mismatch, nominal = scenario.mismatch, plant(scenario)
     hull.plants[w], hull.thrust[w] = nominal, 1.0
@@ -101,40 +101,39 @@ def sample_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, 
 
 
 def victims(key: np.uint64, fault: int, scenario: Scenario) -> list[int]:
-    """The vehicles that a fault hits: the first of an order drawn for each fault, whatever its share."""
+    """Vehicles that a fault affects: the first ones of a random order of its own, which its share doesn't change."""
     n = scenario.swarm.num_vehicles
     order = sorted(range(n), key=lambda i: uniform(key, VICTIM, 0, i, fault))
     return order[: math.ceil(scenario.faults[fault].share * n - 1e-9)]
 
 
 def window(key: np.uint64, fault: int, vehicle: int, duration_s: float, scenario: Scenario) -> tuple[int, int]:
-    """Control holds from which and up to which a fault acts on a vehicle; an onset is drawn within ``duration_s``."""
+    """First control step of a fault of a vehicle, and the end; a random onset lies within ``duration_s``."""
     settings = scenario.faults[fault]
     drawn = duration_s * uniform(key, ONSET, 0, vehicle, fault)
     control_step_s, onset = scenario.timing.control_step_s, drawn if settings.onset_s is None else settings.onset_s
     first = math.ceil(onset / control_step_s - 1e-9)
-    return first, _NEVER if settings.duration_s is None else first + math.ceil(
-        settings.duration_s / control_step_s - 1e-9
-    )
+    lasts = settings.duration_s
+    return first, _NEVER if lasts is None else first + math.ceil(lasts / control_step_s - 1e-9)
 
 
 def hit(tick: Int64, hull: Hull) -> Bool:
-    """The vehicles that a fault has hit before this control hold of each world, shape (world, vehicle)."""
+    """Vehicles that a fault has affected before this control step of each world, shape (world, vehicle)."""
     first, end = hull.broken[..., 0], hull.broken[..., 1]
     return np.logical_or.reduce((first < end) & (first < tick[:, None, None]), axis=2)
 
 
 @compiled
 def acts(w: int, i: int, fault: int, tick: int, hull: Hull) -> bool:
-    """Whether a fault acts on a vehicle in a control hold. ``tick`` is that at the start of the hold."""
+    """Whether a fault acts on a vehicle in the control step that starts at ``tick``."""
     return hull.broken[w, i, fault, 0] <= tick < hull.broken[w, i, fault, 1]
 
 
 @compiled_inner
 def weaken(w: int, tick: int, now: Columns, numbers: Actuation, hull: Hull) -> None:
-    """Thrust and torque asked of the vehicles, lessened by mismatch, authority and faults.
+    """Reduce the commanded thrust and torque of a control step by mismatch, yaw authority and faults.
 
-    ``tick`` is that at the start of the hold. Thrust and torque are written.
+    ``tick`` is that at the start of the control step.
     """
     for i in range(hull.thrust.shape[1]):
         now.tau_u[i] *= hull.thrust[w, i]
@@ -150,11 +149,11 @@ def weaken(w: int, tick: int, now: Columns, numbers: Actuation, hull: Hull) -> N
 
 @compiled_inline
 def followed(commanded: float, initial: float, half: float, whole: float) -> tuple[float, float, float]:
-    """A lagging force at the start, in the middle and at the end of a step: asked + (given - asked) e^(-t / lag).
+    """First-order lag at start, middle and end of a step: commanded + (initial - commanded) e^(-t / lag).
 
     Args:
-        asked: thrust [N] or torque [N m] that is asked for.
-        given: what reaches the water at the start, in the same unit.
+        commanded: thrust [N] or torque [N m].
+        initial: the actual value at the start, in the same unit.
         half: e^(-t / lag) after half a step.
         whole: e^(-t / lag) after a step; 0 without a lag.
     """
@@ -167,9 +166,9 @@ def followed(commanded: float, initial: float, half: float, whole: float) -> tup
 def integrate_each(
     w: int, alive: Bool, rules: Rules, now: Columns, numbers: Actuation, hull: Hull, flow: Float64
 ) -> None:
-    """One control hold of vehicles that differ, lag and are carried along. Eq. 1-4, 23-24.
+    """Integrate vehicles with parameters of their own, lags and a current over one control step. Eq. 1-4, 23-24.
 
-    ``now`` holds thrust and torque as asked for. The forces that reach the water, ``hull.tau``, are written.
+    ``now`` holds the commanded thrust and torque; the actual ones, ``hull.tau``, are written.
     """
     for i in range(hull.tau.shape[1]):
         if not alive[w, i]:
@@ -189,7 +188,7 @@ def integrate_each(
 
 @compiled_inline
 def own_plant(w: int, i: int, hull: Hull) -> Plant:
-    """Vehicle i's numbers. Every field has a column of its own: tests/test_sea.py."""
+    """Vehicle i's own parameters; ``hull.plants`` holds the fields in order."""
     p = hull.plants[w, i]
     return Plant(
         p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14], p[15], p[16],
@@ -199,7 +198,7 @@ def own_plant(w: int, i: int, hull: Hull) -> Plant:
 
 @compiled_inner
 def is_lost_to_fault(w: int, i: int, tick: int, numbers: Actuation, hull: Hull) -> bool:
-    """Whether a fault has lost a vehicle by the end of a control hold. ``tick`` counts this hold."""
+    """Whether a fault has lost a vehicle by the end of a control step, which ``tick`` counts."""
     lost = False
     for f in range(numbers.kind.shape[0]):
         lost = lost or (numbers.kind[f] == MEMBER and hull.broken[w, i, f, 0] <= tick)

@@ -1,7 +1,7 @@
-"""How the water moves: a mean, a Gauss-Markov process (Fossen 2021, section 10.3) and Lamb-Oseen eddies, summed.
+"""Current: the sum of a mean, a Gauss-Markov process (Fossen 2021, section 10.3) and Lamb-Oseen eddies.
 
-A vehicle's equations of motion hold relative to the water, and the water carries it along
-(``uuv_marl.sim.vehicle.derivative``). The field is read at each vehicle once per control hold.
+A vehicle's equations of motion hold relative to the water, which carries it along
+(``uuv_marl.sim.vehicle.derivative``). The field is evaluated at each vehicle once per control step.
 """
 
 import itertools
@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from uuv_marl.percept import MAX_SPEED
+from uuv_marl.percept import MAX_SPEED, DisturbanceFields, Fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.disturbance_sections import AROUND_M
 from uuv_marl.sim.arrays import State, World
@@ -22,7 +22,6 @@ from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.random import normals, uniform, uniforms
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import DisturbanceFields, Fields
 from uuv_marl.types import Float64
 
 _PEAK = 0.638172686
@@ -30,22 +29,22 @@ _PEAK = 0.638172686
 
 
 class WaterModel(NamedTuple):
-    """Numbers of a scenario's current."""
+    """Constants of a scenario's current."""
 
     speed: float
     """Speed of the mean current [m/s]."""
     direction: float
-    """Direction to which the mean current flows [rad], NaN where the seed draws it."""
+    """Direction to which the mean current flows [rad], NaN if random."""
     deviation: float
     """Standard deviation of the process [m/s]."""
     remains: float
-    """Share of the process's value that remains after a control hold."""
+    """Autocorrelation of the process over a control step."""
     circulation: float
     """Circulation of an eddy [m2/s]."""
     core: float
     """Radius of an eddy's core [m]."""
     over_ground: bool
-    """Whether a vehicle knows its velocity over ground, not through the water."""
+    """Whether a vehicle measures its velocity over ground, not through the water."""
 
 
 @described
@@ -53,20 +52,20 @@ class Flow(NamedTuple):
     """The current of each world."""
 
     mean: Annotated[Float64, "world 2", "Velocity of the mean, north and east [m/s]."]
-    gust: Annotated[Float64, "world 2", "What the process adds to it now [m/s]."]
+    gust: Annotated[Float64, "world 2", "Present value of the process, north and east [m/s]."]
     eddies: Annotated[Float64, "world eddy 3", "Centre north, east [m] and circulation [m2/s]; 0 in the padding."]
     flow: Annotated[Float64, "world vehicle 2", "Velocity of the water at each vehicle, north and east [m/s]."]
 
 
 class FlowField(NamedTuple):
-    """How the water of one world moves at one time, everywhere; a copy, which stays as it is."""
+    """Velocity field of the water of one world at one time; an independent copy."""
 
     drift: Float64
     """Velocity of the mean and the process together, north and east [m/s], shape (2,)."""
     eddies: Float64
     """Centre north, east [m] and circulation [m2/s], shape (eddy, 3)."""
     core_m: float
-    """Radius of the eddies' cores."""
+    """Radius of the eddies' cores [m]."""
 
     def at(self, points: ArrayLike) -> Float64:
         """Velocity of the water, north and east [m/s], at points given by north and east [m]; both (..., 2)."""
@@ -79,13 +78,13 @@ class FlowField(NamedTuple):
 
 
 def flow_field(w: int, core_m: float, flow: Flow) -> FlowField:
-    """How the water of world w moves now."""
+    """Present velocity field of world w."""
     eddies = flow.eddies[w]
     return FlowField(flow.mean[w] + flow.gust[w], eddies[eddies[:, 2] != 0.0], core_m)
 
 
 def water(scenario: Scenario) -> WaterModel:
-    """The scenario's current as numbers for the compiled functions."""
+    """Constants of the scenario's current for the compiled functions."""
     current = scenario.current
     direction = current.direction_deg
     return WaterModel(
@@ -100,7 +99,7 @@ def water(scenario: Scenario) -> WaterModel:
 
 
 def sample_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, water: WaterModel, flow: Flow) -> None:
-    """The current of world w's new episode, along the corners (point, 2) [m] of its course; ``flow`` is written."""
+    """Sample the current of world w's new episode around its ``waypoints``, shape (point, 2) [m], into ``flow``."""
     angle = water.direction
     if math.isnan(angle):
         angle = 2.0 * math.pi * uniform(key, DIRECTION, 0, 0, 0)
@@ -139,9 +138,9 @@ def flow_at(w: int, x: float, y: float, core: float, flow: Flow) -> tuple[float,
 
 @compiled
 def advance_gust(w: int, key: np.uint64, tick: int, water: WaterModel, flow: Flow) -> None:
-    """The process one control hold later, exactly: its mean and variance depend on no step.
+    """Advance the process by one control step exactly: mean and variance don't depend on the step's length.
 
-    ``tick`` counts this hold.
+    ``tick`` counts this control step.
     """
     kick = water.deviation * math.sqrt(1.0 - water.remains * water.remains)
     north, east = normals(key, GUST, tick, 0, 0)
@@ -151,11 +150,11 @@ def advance_gust(w: int, key: np.uint64, tick: int, water: WaterModel, flow: Flo
 
 @compiled_inner
 def read_flow(w: int, state: State, water: WaterModel, flow: Flow) -> None:
-    """The water's velocity at every vehicle of a world."""
+    """Evaluate the current at every vehicle of world w into ``flow.flow``."""
     everywhere = flow.mean[w, 0] + flow.gust[w, 0], flow.mean[w, 1] + flow.gust[w, 1]
     for i in range(state.eta.shape[1]):
         flow.flow[w, i, 0], flow.flow[w, i, 1] = everywhere
-    for k in range(flow.eddies.shape[1]):  # as flow_at, but eddy by eddy, on vector registers
+    for k in range(flow.eddies.shape[1]):  # as flow_at, but eddy by eddy, which is vectorised
         x, y, circulation = flow.eddies[w, k, 0], flow.eddies[w, k, 1], flow.eddies[w, k, 2]
         for i in range(state.eta.shape[1] if circulation != 0.0 else 0):
             north, east = eddy_flow(state.eta[w, i, 0] - x, state.eta[w, i, 1] - y, circulation, water.core)
@@ -165,7 +164,7 @@ def read_flow(w: int, state: State, water: WaterModel, flow: Flow) -> None:
 
 @compiled
 def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]:
-    """Velocity of a vehicle over ground, north and east [m/s]; a lost one stands still."""
+    """Velocity of a vehicle over ground, north and east [m/s]; 0 for a lost one."""
     if not state.alive[w, j]:
         return 0.0, 0.0
     (c, s), u, v = cos_sin(state.eta[w, j, 2]), state.nu[w, j, 0], state.nu[w, j, 1]
@@ -174,7 +173,7 @@ def over_ground(w: int, j: int, state: State, flow: Flow) -> tuple[float, float]
 
 @compiled_inner
 def write_velocities(w: int, world: World, water: WaterModel, flow: Flow, see: Fields, more: DisturbanceFields) -> None:
-    """Write each vehicle's own velocity, and by the link its neighbours', as the current makes them."""
+    """Write each vehicle's velocity in the current, and its neighbours' by the link, into the percepts of world w."""
     state, heading = world.state, world.senses.heading
     for i in range(state.alive.shape[1]):
         if not state.alive[w, i]:

@@ -1,6 +1,6 @@
-"""The sea: everything that disturbs a world, in rooms of their own, and the moments of a step at which each acts.
+"""Everything that disturbs a world, and the moments of a step at which each disturbance acts.
 
-A world without disturbances has no sea (None), and its compiled code holds nothing of this.
+A world without disturbances has None instead, and its compiled code contains none of this.
 """
 
 from collections.abc import Mapping
@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from uuv_marl.percept import FIELDS, DisturbanceFields, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.conditions import vehicle_disturbances
 from uuv_marl.sim.arrays import State, World, WorldMap
@@ -21,7 +22,7 @@ from uuv_marl.sim.disturbances.current import (
     sample_flow,
     water,
     write_velocities,
-)
+)  # fmt: skip
 from uuv_marl.sim.disturbances.modem import Messages, ModemModel, clear_messages, exchange, modem, write_messages
 from uuv_marl.sim.disturbances.navigation import (
     NavigationErrors,
@@ -29,9 +30,8 @@ from uuv_marl.sim.disturbances.navigation import (
     drift_position,
     navigate,
     navigation,
-    reset_position_error,
     sample_navigation_errors,
-)
+)  # fmt: skip
 from uuv_marl.sim.disturbances.noise import (
     NoiseModel,
     SensorErrors,
@@ -41,31 +41,30 @@ from uuv_marl.sim.disturbances.noise import (
     sample_sensor_errors,
     schedule_outages,
     write_ranged,
-)
+)  # fmt: skip
 from uuv_marl.sim.disturbances.readings import (
     Detections,
     Readings,
-    any_due,
     begin_line,
     collect,
     line_sizes,
     remember,
     store,
     write_readings,
-)
+)  # fmt: skip
 from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming, due, sonar_timing
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.tables import allocate
-from uuv_marl.sim.views import DisturbanceFields, Fields
+from uuv_marl.sim.views import disturbance_fields, fields
 from uuv_marl.sim.workspace import Columns
 from uuv_marl.types import UInt64
 
-DISTURBANCE_CHANNELS = ("current", "age", "ranged", "modem")
+DISTURBANCE_CHANNELS = tuple(dict.fromkeys(FIELDS[name].channel for name in DisturbanceFields._fields))
 """Channels that only a disturbed world's code writes."""
 
 
 class Disturbances(NamedTuple):
-    """What disturbs a batch of worlds: of each room its numbers, made once, and its arrays, that change."""
+    """Disturbances of a batch of worlds: for each module its constant numbers and its arrays."""
 
     keys: UInt64
     """Key of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
@@ -85,11 +84,11 @@ class Disturbances(NamedTuple):
 
 
 def make_disturbances(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Disturbances | None:
-    """What disturbs worlds of a scenario; None for nothing.
+    """Disturbances of a scenario's worlds; None without any.
 
     Args:
-        scenario: with its disturbances.
-        keys: of the worlds' episodes, shape (world,); kept, and read as they change.
+        scenario: the scenario with its disturbances.
+        keys: keys of the worlds' episodes, shape (world,); kept, and read as they change.
         sizes: lengths of the axes of all tables.
     """
     if not vehicle_disturbances(scenario) and not set(DISTURBANCE_CHANNELS) & set(scenario.sonar.channels):
@@ -118,7 +117,7 @@ def make_disturbances(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]
 def sample_disturbances(
     w: int, scenario: Scenario, world_map: WorldMap, duration_s: float, disturbances: Disturbances
 ) -> None:
-    """The sea of world w's new episode, from its key alone."""
+    """Sample the disturbances of world w's new episode from its key."""
     key = np.uint64(disturbances.keys[w])
     corners = [points[: last + 1] for points, last in zip(world_map.waypoints[w], world_map.last[w], strict=True)]
     sample_flow(w, key, np.concatenate(corners), scenario, disturbances.water, disturbances.flow)
@@ -129,112 +128,76 @@ def sample_disturbances(
 
 
 def disturbance_tables(disturbances: Disturbances | None) -> tuple[Any, ...]:
-    """All that changes, for snapshots."""
-    return (
-        ()
-        if disturbances is None
-        else (
-            disturbances.flow,
-            disturbances.hull,
-            disturbances.readings,
-            disturbances.sensor_errors,
-            disturbances.navigation_errors,
-            disturbances.messages,
-        )
-    )
+    """All arrays that change, for snapshots."""
+    d = disturbances
+    return () if d is None else (d.flow, d.hull, d.readings, d.sensor_errors, d.navigation_errors, d.messages)
 
 
 @compiled_inner
 def integrate_disturbed(w: int, state: State, rules: Rules, now: Columns, disturbances: Disturbances) -> None:
-    """One control hold of world w. Forces that reach the water are written."""
+    """Move world w by one control step. The forces in the water, ``hull.tau``, are written."""
     weaken(w, state.tick[w], now, disturbances.actuation, disturbances.hull)
     integrate_each(w, state.alive, rules, now, disturbances.actuation, disturbances.hull, disturbances.flow.flow)
 
 
 @compiled_inner
 def advance_disturbances(w: int, world: World, disturbances: Disturbances) -> None:
-    """The sea at the end of a control hold, whose number is already counted."""
-    advance_gust(w, disturbances.keys[w], world.state.tick[w], disturbances.water, disturbances.flow)
-    read_flow(w, world.state, disturbances.water, disturbances.flow)
-    drift_position(w, world.state, disturbances.navigation, disturbances.navigation_errors)
+    """Update the disturbances at the end of a control step, which ``state.tick`` already counts."""
+    key, flow, errors = disturbances.keys[w], disturbances.flow, disturbances.navigation_errors
+    advance_gust(w, key, world.state.tick[w], disturbances.water, flow)
+    read_flow(w, world.state, disturbances.water, flow)
+    drift_position(w, world.state, disturbances.navigation, errors)
     remember(w, world.state, disturbances.readings)
-    exchange(
-        w,
-        disturbances.keys[w],
-        world,
-        disturbances.modem,
-        disturbances.messages,
-        disturbances.flow,
-        disturbances.navigation_errors,
-    )
+    exchange(w, key, world, disturbances.modem, disturbances.messages, flow, errors)
 
 
 @compiled_inner
 def begin_disturbances(w: int, world: World, disturbances: Disturbances) -> None:
-    """The sea around vehicles as they stand, after a reset or where their states were written by hand."""
-    read_flow(w, world.state, disturbances.water, disturbances.flow)
-    reset_position_error(w, disturbances.navigation_errors)
-    schedule_outages(w, disturbances.keys[w], disturbances.noise, disturbances.sensor_errors)
+    """Start the disturbances from the present states, after a reset or once states were written by hand."""
+    key, flow, errors = disturbances.keys[w], disturbances.flow, disturbances.navigation_errors
+    read_flow(w, world.state, disturbances.water, flow)
+    errors.position_error[w] = 0.0
+    schedule_outages(w, key, disturbances.noise, disturbances.sensor_errors)
     begin_line(w, world.state, disturbances.readings)
-    exchange(
-        w,
-        disturbances.keys[w],
-        world,
-        disturbances.modem,
-        disturbances.messages,
-        disturbances.flow,
-        disturbances.navigation_errors,
-    )
+    exchange(w, key, world, disturbances.modem, disturbances.messages, flow, errors)
 
 
 @compiled_inner
 def reads(w: int, tick: int, disturbances: Disturbances) -> bool:
-    """Whether an array of world w takes a reading at this control hold that a decision will see."""
-    return any_due(w, tick, disturbances.sonar_timing, disturbances.readings)
+    """Whether an array of world w takes a reading at this control step that a decision will use."""
+    timing, is_due = disturbances.sonar_timing, False
+    since = tick - disturbances.readings.began[w]
+    for a in range(0 if timing.ideal else timing.every.shape[0]):
+        is_due = is_due or due(since, timing.every[a], timing.delay, timing.control_steps) >= 0
+    return is_due
 
 
 @compiled_inner
-def take_readings(w: int, world: World, disturbances: Disturbances, see: Fields) -> None:
-    """Keep what the arrays hear now, from percepts that hold what is true."""
-    tick, line = world.state.tick[w], disturbances.sonar_timing
-    for a in range(0 if line.ideal else line.every.shape[0]):
-        number = due(tick - disturbances.readings.began[w], line.every[a], line.delay, line.control_steps)
+def take_readings(w: int, world: World, at: Starts, disturbances: Disturbances) -> None:
+    """Store the arrays' readings of this control step, from percepts that hold true values."""
+    tick, timing, noise = world.state.tick[w], disturbances.sonar_timing, disturbances.noise
+    errors, readings, detections = disturbances.sensor_errors, disturbances.readings, disturbances.detections
+    key, see = disturbances.keys[w], fields(world.senses.percept, at)
+    for a in range(0 if timing.ideal else timing.every.shape[0]):
+        number = due(tick - readings.began[w], timing.every[a], timing.delay, timing.control_steps)
         if number >= 0:
-            at = Reading(w, a, number, tick, number % disturbances.readings.detected_index.shape[1])
-            num = collect(
-                at, world, see, line, disturbances.navigation_errors, disturbances.readings, disturbances.detections
-            )
-            add_errors(
-                at,
-                num,
-                disturbances.keys[w],
-                line.active[a] == line.active[a + 1],
-                disturbances.noise,
-                disturbances.sensor_errors,
-                disturbances.detections,
-            )
-            store(at, num, line, disturbances.detections, disturbances.readings)
+            reading = Reading(w, a, number, tick, number % readings.detected_index.shape[1])
+            num = collect(reading, world, see, timing, disturbances.navigation_errors, readings, detections)
+            add_errors(reading, num, key, timing.active[a] == timing.active[a + 1], noise, errors, detections)
+            store(reading, num, timing, detections, readings)
             apply_outages(
-                at,
-                disturbances.keys[w],
-                line,
-                disturbances.noise,
-                disturbances.sensor_errors,
-                disturbances.actuation,
-                disturbances.hull,
-                disturbances.detections,
-                disturbances.readings,
+                reading, key, timing, noise, errors, disturbances.actuation, disturbances.hull, detections, readings
             )
 
 
 @compiled_inner
-def apply_disturbances(w: int, world: World, disturbances: Disturbances, see: Fields, more: DisturbanceFields) -> None:
-    """Percepts that hold what is true become what vehicles know. ``heard`` is written, too."""
-    if not disturbances.sonar_timing.ideal:
-        write_readings(
-            w, world, disturbances.sonar_timing, disturbances.navigation_errors, disturbances.readings, see, more
-        )
-    write_ranged(w, world.state.alive, disturbances.sonar_timing, disturbances.noise, more)
+def apply_disturbances(w: int, world: World, at: Starts, disturbances: Disturbances) -> None:
+    """Turn percepts that hold true values into what vehicles observe; ``detected_index`` is written, too."""
+    timing, errors = disturbances.sonar_timing, disturbances.navigation_errors
+    see, more = fields(world.senses.percept, at), disturbance_fields(world.senses.percept, at)
+    if not timing.ideal:
+        write_readings(w, world, timing, errors, disturbances.readings, see, more)
+    write_ranged(w, world.state.alive, timing, disturbances.noise, more)
     write_velocities(w, world, disturbances.water, disturbances.flow, see, more)
-    write_messages(w, world, disturbances.messages, disturbances.navigation_errors, more)
-    navigate(w, world, disturbances.navigation, disturbances.navigation_errors, see)
+    write_messages(w, world, disturbances.messages, errors, more)
+    navigate(w, world, disturbances.navigation, errors, see)

@@ -1,7 +1,7 @@
-"""What a vehicle knows of where it is: a position that drifts off, and a compass with a lasting error.
+"""Navigation errors: a drifting position estimate, and a compass with a constant bias.
 
-Both turn up where the world meets the body frame: in the vector to l(t), its velocity, and the compass; the compass's
-error also in messages. The sonar needs neither. The compass's error doesn't feed the drift: each is an axis of its own.
+Both change the vector to l(t), its velocity and the compass in the body frame; the bias also changes messages. The
+sonar is unaffected. The bias does not cause drift: the two are independent.
 """
 
 import math
@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import MAX_SPEED
+from uuv_marl.percept import MAX_SPEED, Fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
@@ -18,87 +18,73 @@ from uuv_marl.sim.perception import saturate, toward
 from uuv_marl.sim.random import normal, uniform
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import Fields
 from uuv_marl.types import Float64
 
 
 class NavigationModel(NamedTuple):
-    """Numbers of a scenario's navigation."""
+    """Constants of a scenario's navigation."""
 
     drift_share: float
-    """Share of the way made over ground by which the known position is off."""
+    """Error of the estimated position per distance travelled over ground."""
     compass_bias: float
-    """Standard deviation of a compass's error [rad]."""
+    """Standard deviation of a compass's bias [rad]."""
 
 
 @described
 class NavigationErrors(NamedTuple):
-    """What each vehicle's navigation gets wrong."""
+    """Errors of each vehicle's navigation."""
 
     drift_direction: Annotated[Float64, "world vehicle 2", "Direction of its drift, a unit vector north and east."]
-    position_error: Annotated[Float64, "world vehicle 2", "Known less true position, north and east [m]."]
-    bias: Annotated[Float64, "world vehicle 2", "Cosine and sine of its compass's error, clockwise."]
+    position_error: Annotated[Float64, "world vehicle 2", "Estimated less true position, north and east [m]."]
+    bias: Annotated[Float64, "world vehicle 2", "Cosine and sine of its compass's bias, clockwise."]
 
 
 def navigation(scenario: Scenario) -> NavigationModel:
-    """The scenario's navigation as numbers for the compiled functions."""
+    """Constants of the scenario's navigation for the compiled functions."""
     own = scenario.navigation
     return NavigationModel(own.drift_share, math.radians(own.compass_bias_deg))
 
 
-def sample_navigation_errors(
-    w: int, key: np.uint64, navigation: NavigationModel, navigation_errors: NavigationErrors
-) -> None:
-    """Directions and errors of world w's new episode, from its key."""
-    for i in range(navigation_errors.position_error.shape[1]):
-        navigation_errors.drift_direction[w, i] = cos_sin(2.0 * math.pi * uniform(key, DRIFT, 0, i, 0))
-        navigation_errors.bias[w, i] = cos_sin(navigation.compass_bias * normal(key, COMPASS, 0, i, 0))
+def sample_navigation_errors(w: int, key: np.uint64, navigation: NavigationModel, errors: NavigationErrors) -> None:
+    """Sample drift directions and compass biases of world w's new episode from its key."""
+    for i in range(errors.position_error.shape[1]):
+        errors.drift_direction[w, i] = cos_sin(2.0 * math.pi * uniform(key, DRIFT, 0, i, 0))
+        errors.bias[w, i] = cos_sin(navigation.compass_bias * normal(key, COMPASS, 0, i, 0))
 
 
 @compiled_inner
-def reset_position_error(w: int, navigation_errors: NavigationErrors) -> None:
-    """The vehicles of world w know where they are."""
-    navigation_errors.position_error[w] = 0.0
-
-
-@compiled_inner
-def drift_position(w: int, state: State, navigation: NavigationModel, navigation_errors: NavigationErrors) -> None:
-    """Known positions after one control hold."""
+def drift_position(w: int, state: State, navigation: NavigationModel, errors: NavigationErrors) -> None:
+    """Add the drift of one control step to the position errors."""
     if navigation.drift_share == 0.0:
         return
     for i in range(state.eta.shape[1]):
         dx, dy = state.eta[w, i, 0] - state.before[w, i, 0], state.eta[w, i, 1] - state.before[w, i, 1]
         off = navigation.drift_share * math.sqrt(dx * dx + dy * dy)
-        navigation_errors.position_error[w, i, 0] += off * navigation_errors.drift_direction[w, i, 0]
-        navigation_errors.position_error[w, i, 1] += off * navigation_errors.drift_direction[w, i, 1]
+        errors.position_error[w, i, 0] += off * errors.drift_direction[w, i, 0]
+        errors.position_error[w, i, 1] += off * errors.drift_direction[w, i, 1]
 
 
 @compiled
-def by_compass(w: int, i: int, north: float, east: float, navigation_errors: NavigationErrors) -> tuple[float, float]:
-    """A vector north and east as a vehicle's compass has it: turned clockwise by the compass's error.
-
-    The vector may be a heading's cosine and sine.
-    """
-    c, s = navigation_errors.bias[w, i, 0], navigation_errors.bias[w, i, 1]
+def by_compass(w: int, i: int, north: float, east: float, errors: NavigationErrors) -> tuple[float, float]:
+    """Turn a vector north and east, or a heading's cosine and sine, clockwise by a vehicle's compass bias."""
+    c, s = errors.bias[w, i, 0], errors.bias[w, i, 1]
     return c * north - s * east, c * east + s * north
 
 
 @compiled_inner
-def navigate(
-    w: int, world: World, navigation: NavigationModel, navigation_errors: NavigationErrors, see: Fields
-) -> None:
-    """Write l(t) and the compass into the percepts of world w as each vehicle's navigation has them."""
+def navigate(w: int, world: World, navigation: NavigationModel, errors: NavigationErrors, see: Fields) -> None:
+    """Write l(t) and the compass into the percepts of world w as each vehicle's navigation estimates them."""
     if navigation.drift_share == 0.0 and navigation.compass_bias == 0.0:
         return
     eta, heading, reference = world.state.eta, world.senses.heading, world.facts.reference
     for i in range(eta.shape[1]):
         if not world.state.alive[w, i]:
             continue
-        c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], navigation_errors)
+        c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], errors)
         if world.world_map.informed[w, i]:
             l_t = reference[w, world.world_map.group[w, i]]
-            dx = l_t[0] - (eta[w, i, 0] + navigation_errors.position_error[w, i, 0])
-            dy = l_t[1] - (eta[w, i, 1] + navigation_errors.position_error[w, i, 1])
+            dx = l_t[0] - (eta[w, i, 0] + errors.position_error[w, i, 0])
+            dy = l_t[1] - (eta[w, i, 1] + errors.position_error[w, i, 1])
             v_x, v_y = l_t[2], l_t[3]
             see.reference[w, i, 0], see.reference[w, i, 1] = toward(dx, dy, c, s)
             see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)

@@ -1,4 +1,4 @@
-"""What random numbers of an episode are for: one purpose for each draw, so that no disturbance moves another's."""
+"""Purposes of an episode's random numbers, one for each draw, so that disturbances never change each other's."""
 
 DIRECTION, GUST, EDDY_PLACE = 1, 2, 3
 MISMATCH, VICTIM, ONSET = 10, 11, 12

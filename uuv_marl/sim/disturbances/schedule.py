@@ -1,7 +1,7 @@
-"""When each array reads, and when a policy has what it heard.
+"""Schedule of sonar readings: when each array takes one, and when a policy receives it.
 
-A reading is what one array hears at the end of one control hold. It stands from ``latency.processing_s`` after its
-reception until the array's next one does.
+A reading holds the detections of one array at the end of one control step. It is available from
+``latency.processing_s`` after its reception until the array's next one is.
 """
 
 import math
@@ -15,22 +15,22 @@ from uuv_marl.types import Float64, Int64
 
 
 class SonarTiming(NamedTuple):
-    """Numbers of a scenario's arrays and of how late they are. Times in control holds."""
+    """Constants of the arrays' schedule and latency; times in control steps."""
 
     ideal: bool
-    """Whether all is heard at once and as it is, so that percepts stay as they are."""
+    """Whether readings are immediate and without error, so that percepts stay unchanged."""
     control_step_s: float
-    """Length of a control hold [s]."""
+    """Length of a control step [s]."""
     control_steps: int
-    """Control holds of a decision."""
+    """Control steps of a decision."""
     delay: int
-    """Control holds from the reception of a reading until a policy has it."""
+    """Control steps from the reception of a reading until a policy receives it."""
     control_steps_per_metre: float
-    """Control holds that sound takes for a metre; 0: none."""
+    """Control steps that sound takes per metre; 0: none."""
     compensated: bool
-    """Whether readings are carried to the present pose."""
+    """Whether readings are moved to the present pose."""
     every: Float64
-    """Control holds between two readings of each array, at least 1, shape (array,)."""
+    """Control steps between two readings of each array, at least 1, shape (array,)."""
     first: Int64
     """First sub-sector of each array, and their number, shape (array + 1,)."""
     active: Int64
@@ -45,15 +45,15 @@ class Reading(NamedTuple):
     a: int
     """Index of the array."""
     number: int
-    """Number of the reading among those that the array took."""
+    """Number of the reading among the array's."""
     tick: int
-    """Control hold of its reception."""
+    """Control step of its reception."""
     slot: int
-    """Place at which the reading is kept."""
+    """Slot of the delay line that stores the reading."""
 
 
 def sonar_timing(scenario: Scenario) -> SonarTiming:
-    """The scenario's arrays and delays as numbers for the compiled functions."""
+    """Constants of the scenario's schedule and latency for the compiled functions."""
     latency, arrays, control_step_s = scenario.latency, scenario.sonar.arrays, scenario.timing.control_step_s
     period_s = {"active": latency.active_period_s, "passive": latency.passive_period_s}
     sub_sectors = [array.sub_sectors for array in arrays]
@@ -73,13 +73,13 @@ def sonar_timing(scenario: Scenario) -> SonarTiming:
 
 @compiled
 def control_step_of(number: int, every: float) -> int:
-    """Control hold, from the first reading on, at which an array takes a reading: the nearest to its time."""
+    """Control step of a reading, counted from the first one: the nearest to its time."""
     return math.floor(number * every + 0.5)
 
 
 @compiled
 def latest(control_step: int, every: float) -> int:
-    """Number of the latest reading up to a control hold, -1 for none."""
+    """Number of the latest reading up to a control step, -1 for none."""
     if control_step < 0:
         return -1
     number = int((control_step + 0.5) / every) + 1
@@ -90,10 +90,9 @@ def latest(control_step: int, every: float) -> int:
 
 @compiled
 def due(control_step: int, every: float, delay: int, control_steps: int) -> int:
-    """Number of the reading that an array takes at this control hold; -1 for none, or one that no decision will see.
+    """Number of the reading that an array takes at this control step; -1 for none, or for one that no decision uses.
 
-    ``hold``: since the array began; ``every``: holds between readings; ``delay``: until a policy has one; ``holds``: of
-    a decision.
+    ``control_step`` counts from the array's first one; the others are those of ``SonarTiming``.
     """
     number = latest(control_step, every)
     if control_step_of(number, every) != control_step:

@@ -1,13 +1,14 @@
-"""Ways through a map, on a grid: whether there is one, by arithmetic of our own, and how long it is, by SciPy.
+"""Collision-free paths through a map, on a grid: whether there is one, and its length.
 
-Whether a cell is free takes products and sums alone, so that every processor accepts the same maps. Lengths never
-decide anything: they are for reference times, limits, critics and rewards that say so, and no vehicle perceives them.
+Whether a cell is free takes products and sums alone, so that every processor accepts the same maps. Lengths serve
+reference times, time limits, critics, the reward ``geodesic`` and the channel ``path``.
 """
 
 import functools
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.ndimage import label
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -15,9 +16,9 @@ from uuv_marl.sim.compiled import compiled
 from uuv_marl.types import Bool, Float64, Int32, Int64
 
 CELL_M = 2.5
-"""Side of a cell [m]. Assumed: fine enough for gaps of 10 m, and a map is drawn in milliseconds."""
+"""Side of a cell [m]. Assumed: fine enough for gaps of 10 m, and quick."""
 _STEPS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
-"""To neighbours; those of a knight make a length at most 2.8 % too long (1 / cos 13.3 deg)."""
+"""Steps to neighbours; with a knight's moves a length is at most 2.8 % too long (1 / cos 13.3 deg)."""
 
 
 class MapGrid(NamedTuple):
@@ -50,16 +51,15 @@ def free_cells(discs: Float64, grid: MapGrid, clearance: float) -> Bool:
 
 
 def reached(free: Bool, row: int, column: int) -> Bool:
-    """Cells to which free cells lead, side by side, from one of them, shape (row, column)."""
-    seen = np.zeros_like(free)
-    _flood(free, row, column, np.empty(free.size, np.int64), seen)
-    return seen
+    """Free cells connected to one of them by their sides, shape (row, column); none if that one is not free."""
+    parts: Any = label(free)[0]
+    return free & (parts == parts[row, column])
 
 
 def distances(free: Bool, row: int, column: int, price: Float64 | None = None) -> Float64:
-    """Length of the shortest free way [m] to a cell from each, shape (row, column); infinite where none leads.
+    """Length of the shortest collision-free path [m] from each cell to one, shape (row, column); infinite if none.
 
-    ``price``: by which the length of a way through each cell is multiplied, shape (row, column); None for 1.
+    ``price``: factor of the length in each cell, shape (row, column); None for 1.
     """
     first, second, length, indptr = _edges(*free.shape)
     flat = free.ravel()
@@ -74,7 +74,7 @@ def distances(free: Bool, row: int, column: int, price: Float64 | None = None) -
 
 @functools.cache
 def _edges(rows: int, columns: int) -> tuple[Int64, Int32, Float64, Int32]:
-    """All steps on a grid: from, to, length [m], and where those of each cell begin."""
+    """All steps on a grid: from, to, length [m], and the index of each cell's first."""
     row, column = np.divmod(np.arange(rows * columns), columns)
     first, second, length = [], [], []
     for d_r, d_c in (*_STEPS, *((-a, -b) for a, b in _STEPS)):
@@ -91,7 +91,7 @@ def _edges(rows: int, columns: int) -> tuple[Int64, Int32, Float64, Int32]:
 
 @compiled
 def _stamp(discs: Float64, x: float, y: float, clearance: float, free: Bool) -> None:
-    """Take the cells from ``free`` that are nearer than ``clearance`` to a disc."""
+    """Clear the cells of ``free`` (row, column) that are nearer than ``clearance`` [m] to a disc (disc, 3)."""
     rows, columns = free.shape
     for m in range(discs.shape[0]):
         near = discs[m, 2] + clearance
@@ -102,21 +102,3 @@ def _stamp(discs: Float64, x: float, y: float, clearance: float, free: Bool) -> 
                 dx, dy = x + i * CELL_M - discs[m, 0], y + j * CELL_M - discs[m, 1]
                 if dx * dx + dy * dy < near * near:
                     free[i, j] = False
-
-
-@compiled
-def _flood(free: Bool, row: int, column: int, stack: Int64, seen: Bool) -> None:
-    """Mark in ``seen`` what free cells lead to; ``stack`` has room for all cells."""
-    rows, columns = free.shape
-    num = 0
-    if free[row, column]:
-        stack[0], num, seen[row, column] = row * columns + column, 1, True
-    while num > 0:
-        num -= 1
-        i, j = stack[num] // columns, stack[num] % columns
-        for d in range(4):
-            a, b = i + (d == 0) - (d == 1), j + (d == 2) - (d == 3)
-            if 0 <= a < rows and 0 <= b < columns and free[a, b] and not seen[a, b]:
-                seen[a, b] = True
-                stack[num] = a * columns + b
-                num += 1

@@ -1,4 +1,4 @@
-"""Where a shortest way leads: a point ahead on it, and the walls around, which no vehicle could measure."""
+"""The fields of the channel ``path``: a point ahead on a shortest path, and the nearest walls."""
 
 import math
 
@@ -9,17 +9,17 @@ from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid
 from uuv_marl.types import Float64
 
 NUM_WALLS = 8
-"""Walls around that are told: the nearest. Assumed: all that a hull can touch within a second or two."""
+"""Nearest walls in the channel. Assumed: all that a hull can reach within a second or two."""
 AHEAD_M = 12.0
-"""How far ahead the point on the way is [m]. Assumed: as piloted."""
+"""Distance of the point ahead on the path [m]. Assumed, tried by hand."""
 PATH_FIELDS = (
-    PerceptField("path", (2,), POSITION, "vector to a point ahead on a short way to the goal that keeps off walls"),
-    PerceptField("path_length", (1,), LENGTH, "length of the shortest free way to the goal"),
+    PerceptField("path", (2,), POSITION, "vector to a point ahead on a short path to the goal, clear of walls"),
+    PerceptField("path_length", (1,), LENGTH, "length of the shortest collision-free path to the goal"),
     PerceptField("path_walls", (NUM_WALLS, 2), POSITION, "vectors to the surfaces of the nearest obstacles, else 0"),
 )
-"""Rows of the channel ``way``."""
+"""Fields of the channel ``path``."""
 _TOUCH_M = 1e-3
-"""Distances below this count as this, so that there is a direction [m]; assumed."""
+"""Least distance [m], so that there is a direction; assumed."""
 
 
 @compiled
@@ -34,9 +34,9 @@ def _straight(field: Float64, i: int, j: int, to_i: int, to_j: int) -> bool:
 
 @compiled
 def point_ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
-    """Row and column on the way that ``field`` descends, up to ``AHEAD_M`` straight from a cell of it.
+    """Row and column on the path down ``field``, up to ``AHEAD_M`` ahead and in a straight line from a cell.
 
-    ``field``: what is left from each cell, shape (row, column); infinite on walls.
+    ``field``: remaining cost from each cell, shape (row, column); infinite on walls.
     """
     i, j, far = row, column, 0.0
     while far < AHEAD_M:
@@ -54,7 +54,7 @@ def point_ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
 
 @compiled
 def nearest_walls(pose: Float64, c: float, s: float, discs: Float64, out: Float64) -> None:
-    """Fill ``out`` with vectors to the nearest surfaces in the body frame [m], the nearest first, shape (wall, 2).
+    """Fill ``out`` with vectors to the nearest surfaces in the body frame [m], nearest first, shape (wall, 2).
 
     ``pose``: north, east [m], shape (at least 2,); c, s: cosine and sine of the heading; ``discs``: north, east and
     radius [m], shape (disc, 3).
@@ -79,10 +79,10 @@ def write_path(
     state: State, world_map: WorldMap, heading: Float64, turn: Float64, lead: Float64, grid: MapGrid, path: Float64,
     walls: Float64,
 ) -> None:  # fmt: skip
-    """Fill ``way`` (world, vehicle, 2) and ``walls`` (world, vehicle, wall, 2) with the channel's rows.
+    """Fill ``path`` (world, vehicle, 2) and ``walls`` (world, vehicle, wall, 2), body frame [m].
 
-    ``heading`` (world, vehicle, 2) and ``turn`` of the map (world, 2) are cosine and sine; ``lead``: what is left from
-    each cell, dear near walls, shape (world, row, column).
+    ``heading`` (world, vehicle, 2) and ``turn`` of the map (world, 2) are cosine and sine; ``lead``: remaining cost
+    from each cell, high near walls, shape (world, row, column).
     """
     for w in range(path.shape[0]):
         turn_c, turn_s, discs = turn[w, 0], turn[w, 1], world_map.obstacles[w, : world_map.num_obstacles[w]]
@@ -99,7 +99,7 @@ def write_path(
 
 @compiled
 def write_walls(state: State, world_map: WorldMap, heading: Float64, walls: Float64) -> None:
-    """Fill ``walls`` alone, where a task knows the way without a grid; the others are as in ``tell_way``."""
+    """Fill ``walls`` alone; arguments as in ``write_path``."""
     for w in range(walls.shape[0]):
         for v in range(walls.shape[1]):
             c, s, discs = heading[w, v, 0], heading[w, v, 1], world_map.obstacles[w, : world_map.num_obstacles[w]]

@@ -1,7 +1,7 @@
-"""What maps are made of: walls as rows of discs, and the frame that they are drawn in.
+"""Parts of maps: walls as rows of discs.
 
-The frame: the swarm starts around the origin and its goal lies ``length`` ahead, both in the middle between two banks,
-``half`` to each side; x ahead, y to starboard [m]. A map is turned as a whole when it is done.
+In a map's own frame, x ahead and y to starboard [m], the swarm starts around the origin, its goal lies ``length``
+ahead, and the banks lie at ``half`` to each side. The complete map is then turned.
 """
 
 from itertools import pairwise
@@ -14,10 +14,10 @@ from uuv_marl.scenario.fields import NonNegative, Positive, Section, within
 from uuv_marl.types import Float64
 
 STEP = 1.6
-"""Distance of two discs of a wall, in radii; notches between them are 0.4 radii deep. Assumed: as piloted."""
+"""Distance of two discs of a wall, in radii; notches between them are 0.4 radii deep. Assumed, tried by hand."""
 INTO_BANK_M = 4.0
-"""How far a wall goes on into a bank [m]. Assumed: as piloted; where the foot of a harbour's pier meets a notch of the
-bank, a hull may pass behind it."""
+"""How far a wall extends into a bank [m]. Assumed, tried by hand; where a pier meets a notch of the bank, a hull may
+pass behind it."""
 
 
 def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
@@ -27,7 +27,7 @@ def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
 
 
 Range = Annotated[tuple[NonNegative, NonNegative], AfterValidator(_ordered)]
-"""Lowest and highest value; each map draws its own between them."""
+"""Lowest and highest value, between which each map samples its own."""
 Span = Annotated[tuple[Positive, Positive], AfterValidator(_ordered)]
 """The same, above 0."""
 
@@ -35,19 +35,19 @@ Share = Annotated[float, within(0, 1)]
 
 
 class Basin(NamedTuple):
-    """Closed water before its walls are drawn."""
+    """Closed water before its walls are sampled."""
 
     length: float
-    """Way from the start to the goal [m]."""
+    """Distance from the start to the goal [m]."""
     half: float
     """Distance of each bank from the middle [m]."""
     near: float
-    """Least place ahead of the start at which a wall may stand [m]."""
+    """Least distance of a wall ahead of the start [m]."""
     far: float
-    """The largest [m]; beyond it is the goal's free water."""
+    """The largest [m]; the clear water of the goal begins there."""
 
     def ahead(self, x: float) -> float:
-        """The nearest place at which a wall may stand [m]."""
+        """The distance of a wall that is nearest to this [m]."""
         return min(max(x, self.near), self.far)
 
 
@@ -62,7 +62,7 @@ class MapKind(Section):
         raise NotImplementedError
 
     def blocks(self) -> bool:
-        """Whether a map counts only if the straight way to the goal is blocked."""
+        """Whether a map is accepted only if the straight path to the goal is blocked."""
         return True
 
 
@@ -77,7 +77,7 @@ def side(rng: np.random.Generator) -> float:
 
 
 def wall(start: tuple[float, float], end: tuple[float, float], radius: float) -> Float64:
-    """A row of discs from one point to another, both their centres, shape (disc, 3)."""
+    """A row of discs whose centres lead from one point to another, shape (disc, 3)."""
     a, b = np.array(start), np.array(end)
     offset = b - a
     num = max(1, int(np.ceil(np.sqrt(offset[0] * offset[0] + offset[1] * offset[1]) / (STEP * radius))))
@@ -96,8 +96,8 @@ def banks(length: float, half: float, behind: float, beyond: float, radius: floa
     Args:
         length: from the start to the goal [m].
         half: distance of the banks at the sides [m].
-        behind: how far behind the start the water ends [m].
-        beyond: how far beyond the goal it ends [m].
+        behind: distance of the bank behind the start [m].
+        beyond: distance of the bank beyond the goal [m].
         radius: of the discs [m].
     """
     x = (-behind - radius, length + beyond + radius)
