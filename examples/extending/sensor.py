@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from uuv_marl import baselines, load_scenario
 from uuv_marl.baselines.paper.bio_inspired import BioInspiredPlus
-from uuv_marl.benchmark.evaluate import Run, episodes
+from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 
@@ -44,6 +44,6 @@ class Askew(BioInspiredPlus):
 if __name__ == "__main__":
     scenario = baselines.with_policy_requirements("bio_inspired_plus", load_scenario("starter"))
     for degrees in (0.0, 20.0, 60.0):
-        (run,) = [e for e in episodes(scenario, "sensor:Askew", [0], degrees=degrees) if isinstance(e, Run)]
+        (run,) = episodes(scenario, "sensor:Askew", [0], degrees=degrees)
         time_s, away = run.metrics["task_time_s"] or float("nan"), run.metrics["min_obstacle_distance_m"]
         print(f"{degrees:g} deg askew: arrived after {time_s:.1f} s, {away:.1f} m from the obstacle")

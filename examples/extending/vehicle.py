@@ -4,7 +4,7 @@ import tempfile
 from pathlib import Path
 
 from uuv_marl import baselines, load_scenario
-from uuv_marl.benchmark.evaluate import Run, episodes
+from uuv_marl.benchmark.evaluate import episodes
 
 SLOW = """
 [vehicle]
@@ -40,6 +40,6 @@ if __name__ == "__main__":
         for vehicle in ("literature_185", str(path)):
             changed = load_scenario("starter", overrides={"vehicle": vehicle, "trajectory.speed_mps": 2.0})
             scenario = baselines.with_policy_requirements("bio_inspired", changed)
-            (run,) = [event for event in episodes(scenario, "bio_inspired", [0]) if isinstance(event, Run)]
+            (run,) = episodes(scenario, "bio_inspired", [0])
             time_s, collisions = run.metrics["task_time_s"] or float("nan"), run.metrics["collisions"]
             print(f"{scenario.vehicle.name}: arrived after {time_s:.1f} s, {collisions} collisions")

@@ -91,7 +91,7 @@ def case(values: Mapping[str, Value], scenario: str, seeds: Sequence[int] | None
 
 def runs(of: Case) -> Iterator[Run]:
     """Episodes of a case."""
-    return (run for run in episodes(of.load(), of.policy, of.seeds or (), **of.parameters) if isinstance(run, Run))
+    return episodes(of.load(), of.policy, of.seeds or (), **of.parameters)
 
 
 def measure(values: Mapping[str, Value], seeds: Sequence[int] = SEEDS) -> Numbers:

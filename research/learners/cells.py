@@ -15,7 +15,6 @@ from uuv_marl.atomic import write_text
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.benchmark import evaluate
-from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import Scenario, load_scenario
@@ -106,7 +105,6 @@ def episodes(policy: str, each: EvaluationSet, seeds: range) -> Iterator[Row]:
     rows = [
         {"set": each.name, "seed": str(run.seed), **measures(run.metrics, scenario)}
         for run in evaluate.episodes(scenario, policy, seeds)
-        if isinstance(run, Run)
     ]
     yield from sorted(rows, key=lambda row: int(row["seed"]))
 

@@ -125,12 +125,10 @@ def _rerun(row: Row, report: Callable[[float], None]) -> Run:
     if not row.cells["seed"].isdecimal():
         raise ResultsError(f"seed must be a whole number, got {row.cells['seed']!r}")
     source, seed = row.kind.source(row.cells), int(row.cells["seed"])
+    scenario = with_policy_requirements(source.policy, source.scenario)
     with blaming(source.policy):
-        for event in episodes(with_policy_requirements(source.policy, source.scenario), source.policy, [seed], None):
-            if isinstance(event, Run):
-                return event
-            report(event.share)
-    raise AssertionError("an episode ends in a run or in an error")
+        (run,) = episodes(scenario, source.policy, [seed], None, report)
+    return run
 
 
 def failed(verdicts: Sequence[Verdict]) -> bool:

@@ -68,8 +68,7 @@ def validate(policy: str, training: Training) -> Validation:
 
 
 def _runs(policy: str, part: Part, seeds: Sequence[int]) -> Iterator[Run]:
-    scenario = with_policy_requirements(policy, part.scenario)
-    yield from (event for event in episodes(scenario, policy, seeds) if isinstance(event, Run))
+    return episodes(with_policy_requirements(policy, part.scenario), policy, seeds)
 
 
 def _end_s(run: Run) -> float:
