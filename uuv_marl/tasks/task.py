@@ -61,7 +61,7 @@ class Task(RequiredMethods):
     Numbers: ClassVar[type[Section]] = Section
     """The task's own numbers, in the scenario's table ``task``; ranges as in ``scenario/fields.py``."""
     Memory: ClassVar[type[Any] | None] = None
-    """FieldTable of the task's memory (``uuv_marl.sim.tables``): a NamedTuple of arrays over world and vehicle, zero at the
+    """Table of the task's memory (``uuv_marl.sim.tables``): a NamedTuple of arrays over world and vehicle, zero at the
     start of an episode, and part of the swarm's snapshots."""
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {}}
     """The task's rewards by name, each with its terms in order and their formulas; the first is the default. Every
