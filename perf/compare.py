@@ -38,21 +38,21 @@ ADAPTERS = ("swarm_idle", "task_idle", "vector_env_idle", "sb3_idle", "torchrl_i
 TRAINED = ("mappo", "plain")
 PEERS = ("mpe2", "vmas", "jaxmarl")
 HARD = {"hard_vector_env": "uuv_marl", "hard_core": "uuv_marl", "camar": "camar"}
-"""Library by case, on maps of hundreds of discs."""
+"""Libraries by case, on maps with hundreds of discs."""
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("NUMBA", "OMP", "MKL", "OPENBLAS")}
 LIMIT_S, CASE_LIMIT_S, PATIENCE_S = 240.0, 10.0, 20.0
-"""For a build or a repeat; for a case's repeats together; for a process to end by itself."""
+"""Time limits of a build or a repeat, of all repeats of a case, and of the end of a process [s]."""
 
 Record = dict[str, Any]
 
 
 class Library(NamedTuple):
-    """Where a library's cases run."""
+    """Environment of a library's cases."""
 
     venv: str
     script: str
     environment: Mapping[str, str] = {}
-    """Variables beside those of this process."""
+    """Environment variables besides those of this process."""
 
 
 LIBRARIES = {
@@ -65,7 +65,7 @@ LIBRARIES = {
 
 
 class Cell(NamedTuple):
-    """What is measured in turn: cases by name, each with its library and its number of worlds."""
+    """Cases that are measured in turn, by name, each with its library and number of worlds."""
 
     kind: str
     agents: int
@@ -89,11 +89,11 @@ def plan(training: bool) -> Iterator[Cell]:
 
 
 class CannotRun(Exception):  # noqa: N818 - no fault, a result
-    """Why a case has no rate."""
+    """The reason why a case has no rate."""
 
 
 class Process:
-    """A case in its library's environment; ``built`` is what it said when it was ready. Raises CannotRun."""
+    """A case in its library's environment; ``built`` is its answer when ready. Raises CannotRun."""
 
     def __init__(self, library: Library, case: str, agents: int, worlds: int, seconds: float, limit: float) -> None:
         python = ROOT / library.venv / "bin" / "python"
@@ -125,7 +125,7 @@ class Process:
         raise CannotRun(f"not ready within {self._limit:.0f} s" if ended == -signal.SIGALRM else words)
 
     def stop(self) -> None:
-        """End it; it may do so by itself first."""
+        """End the process, if possible by itself."""
         with contextlib.suppress(BrokenPipeError), self._process:
             if self._process.poll() is None:
                 with contextlib.suppress(subprocess.TimeoutExpired):
@@ -168,7 +168,7 @@ def measure(cell: Cell, rounds: int, seconds: float) -> tuple[list[Record], dict
 
 @contextlib.contextmanager
 def noted(record: Record) -> Iterator[None]:
-    """Write down why a case can't run."""
+    """Record why a case can't run."""
     try:
         yield
     except CannotRun as reason:
@@ -176,12 +176,12 @@ def noted(record: Record) -> Iterator[None]:
 
 
 def key(record: Record) -> tuple[str, str, int, int]:
-    """What a record is about."""
+    """Key of a record."""
     return record["kind"], record["case"], record["agents"], record["worlds"]
 
 
 def machine() -> dict[str, Any]:
-    """What the figures belong to."""
+    """Machine and versions of the results."""
     cpuinfo = Path("/proc/cpuinfo")
     named = [line for line in cpuinfo.read_text().splitlines() if "model name" in line] if cpuinfo.exists() else []
     return {
@@ -193,7 +193,7 @@ def machine() -> dict[str, Any]:
 
 
 def earlier(path: Path, only: list[str]) -> dict[str, Any]:
-    """What the file holds where only a part is measured anew, or an empty record of this machine."""
+    """Content of the file where only a part is measured again, else an empty record of this machine."""
     if not only or not path.exists():
         return {"machine": machine(), "libraries": {}, "cases": []}
     results = json.loads(path.read_text(encoding="utf-8"))
@@ -216,7 +216,7 @@ def table_rows(records: Sequence[Record]) -> Iterator[tuple[object, ...]]:
 
 
 def spread(values: Sequence[float], spec: str) -> str:
-    """Median [lowest, highest]; nothing of nothing."""
+    """Median [lowest, highest]; empty without values."""
     return f"{median(values):{spec}} [{min(values):{spec}}, {max(values):{spec}}]" if values else ""
 
 

@@ -1,4 +1,4 @@
-"""What a step must do, and how fast this machine does just that.
+"""The minimal work of a step, and its speed on this machine.
 
 Kernels without any of the package's code, the same for one world (one thread) and for many (all threads).
 """
@@ -13,23 +13,22 @@ from numpy.typing import NDArray
 
 Float64 = NDArray[np.float64]
 Loop = tuple[Callable[[int], object], float]
-"""Work as a function of how often, and what one time holds."""
+"""From numbers of repetitions and units to the work."""
 PERCEPT = 98
-"""Float32 numbers that a vehicle is told in each step."""
+"""Float32 numbers that a vehicle observes in each step."""
 SECTORS = 21
 """Sub-sectors of a vehicle."""
 
 
 class Work(NamedTuple):
-    """What one step of one world must do, whatever the code."""
+    """Minimal work of one step of one world, for any code."""
 
     pairs: float
-    """Every vehicle may hear every other: n (n - 1) / 2."""
+    """Every vehicle may detect every other: n (n - 1) / 2."""
     keeps: float
-    """Each of a pair is compared with the nearest in the other's sub-sector so far: n (n - 1)."""
+    """Comparisons with the nearest vehicle of a sub-sector: n (n - 1)."""
     sines: float
-    """Sines and cosines: the Runge-Kutta method's three later stages and the new heading; the first stage's heading is
-    the last step's."""
+    """Sines and cosines of three Runge-Kutta stages and the new heading; the first stage has those of the last step."""
     bytes: float
     """Action read, pose and velocity read and written as float64, percept written as float32."""
 
@@ -42,7 +41,7 @@ def work(vehicles: int) -> Work:
 
 
 def least_seconds(vehicles: int, worlds: int, ceilings: Iterable[float]) -> float:
-    """The least time of a step [s], from ceilings per second. Arithmetic adds up; memory may work meanwhile."""
+    """Minimal time of a step [s], from ceilings per second; memory transfers overlap with arithmetic."""
     need = work(vehicles)
     *arithmetic, memory = (amount / rate for amount, rate in zip(need, ceilings, strict=True))
     return worlds * max(sum(arithmetic), memory)
@@ -50,7 +49,7 @@ def least_seconds(vehicles: int, worlds: int, ceilings: Iterable[float]) -> floa
 
 @numba.njit(fastmath=True)
 def all_pairs(x: Float64, y: Float64, out: Float64) -> None:
-    """Sum of the squared distances of all pairs [m2]: a pair loop that does nothing else.
+    """Sum of the squared distances of all pairs [m2], as a minimal pair loop.
 
     The n positions come twice, one after the other, so that each vehicle meets those 1, 2, ... places on in a loop
     without gaps, which vector registers like.
@@ -65,7 +64,7 @@ def all_pairs(x: Float64, y: Float64, out: Float64) -> None:
 
 @numba.njit
 def all_keeps(distance: Float64, sector: Float64, nearest: Float64) -> None:
-    """The smallest distance in each sub-sector, without a branch, since nobody can guess who is nearer."""
+    """The smallest distance in each sub-sector, without a branch, since the nearer one can't be predicted."""
     nearest[:SECTORS] = math.inf
     for k in range(distance.size):
         at = np.uintp(sector[k])
@@ -88,7 +87,7 @@ def all_sines(angle: Float64, y: Float64, out: Float64) -> None:
 
 @numba.njit
 def all_copied(value: Float64, y: Float64, out: Float64) -> None:
-    """A copy."""
+    """Copy an array."""
     for k in range(value.size):
         out[k] = value[k]
 
@@ -97,7 +96,7 @@ KERNELS = {"pairs": all_pairs, "keeps": all_keeps, "sines": all_sines, "copy": a
 
 
 def loop(kind: str, vehicles: int, worlds: int) -> Loop:
-    """A loop of this kind; one time holds all worlds.
+    """A loop of this kind over all worlds.
 
     As much as a step of these worlds: pairs of so many vehicles, and for each of them 16 distances kept, 8 angles or 50
     numbers copied. One world runs on one thread, several run on all, as the package does it.

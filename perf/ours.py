@@ -100,7 +100,7 @@ def adapter(name: str, agents: int, worlds: int) -> Case:
 
 
 def ceiling(kind: str, agents: int, worlds: int) -> Case:
-    """A loop that does nothing but one part of a step's work."""
+    """A loop with one part of a step's work."""
     return Case(*loop(kind, agents, worlds))
 
 

@@ -35,7 +35,7 @@ SETS = {name: (name, {}) for name in ("tracking", "single_obstacle", "multi_obst
     )
     for end, changes in all_changes.items()
 }  # fmt: skip
-"""Scenario and changed fields of what episodes are run on, by name."""
+"""Scenarios with changed fields, by name."""
 REWARD: Any = "sparse" if find_spec("uuv_marl.tasks") else "individual"
 """The reward that both versions have, under its name in each."""
 SEED, MOST_AGENT_STEPS = 10_000, 30_000
@@ -46,7 +46,7 @@ METRICS = (
     "min_obstacle_distance_m", "min_spacing_m", "mean_min_spacing_m", "max_spacing_m", "centre_error_m",
     "order_parameter", "collisions", "constraint_share", "effort", "clamps", "saturation_share", "vehicles_lost",
 )  # fmt: skip
-"""Those that older checkouts have, too."""
+"""Those that older checkouts also have."""
 STATE = ("eta", "nu", "before", "alive", "tick", "dwell")
 FACTS = (
     "time_s", "reference", "centre", "spacing", "min_spacing", "max_spacing", "clearance", "obstacle_clearance",
@@ -55,7 +55,7 @@ FACTS = (
 
 
 def digest(*values: Any) -> str:
-    """Hash of arrays, or of what JSON can hold."""
+    """Hash of arrays or JSON data."""
     hashed = hashlib.sha256()
     for value in values:
         hashed.update(value.tobytes() if isinstance(value, np.ndarray) else json.dumps(value, sort_keys=True).encode())
@@ -104,7 +104,7 @@ def vector(scenario: str) -> str:
 
 
 def reported(policy: str) -> str:
-    """What the benchmark reports of two short episodes: metrics, series, routes."""
+    """The benchmark's metrics, series and trajectories of two short episodes."""
     scenario = with_policy_requirements(policy, load_scenario("single_obstacle", num_vehicles=10))
     runs = [run for run in evaluate.episodes(scenario, policy, [SEED, SEED + 1]) if isinstance(run, Run)]
     metrics = [{key: value for key, value in run.metrics.items() if key in METRICS} for run in runs]

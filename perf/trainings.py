@@ -23,7 +23,7 @@ OURS: dict[str, Any] = {
 
 
 def scenario(agents: int) -> Scenario:
-    """What all train on."""
+    """The common task of all trainings."""
     return load_scenario(SCENARIO, num_vehicles=agents, overrides=OVERRIDES)
 
 
@@ -52,7 +52,7 @@ def sb3_ppo(env: Any, seed: int | None) -> Case:
 
 
 def plain(agents: int, worlds: int) -> Case:
-    """On observations and reward as they come."""
+    """Observations and reward without normalisation."""
     from stable_baselines3.common.vec_env import VecMonitor
 
     from uuv_marl.envs.sb3 import SwarmVecEnv
@@ -90,5 +90,5 @@ def rllib(agents: int, worlds: int) -> Case:
 CASES: dict[str, Maker] = {case.__name__: case for case in (mappo, plain, supersuit, rllib)}
 
 if __name__ == "__main__":
-    torch.set_num_threads(1)  # Numba, OpenMP and BLAS are told by the environment's variables
+    torch.set_num_threads(1)  # Numba, OpenMP and BLAS are set by environment variables
     serve(CASES)

@@ -34,18 +34,18 @@ print(f"| {first - start:.1f} | {time.process_time() - first:.1f} |")
 
 
 def variables(checkout: Path, **more: str) -> dict[str, str]:
-    """With these that checkout's package is imported, and its files stay as they are."""
+    """Environment variables that import another checkout's package without changing its files."""
     return {"PYTHONPATH": str(checkout), "PYTHONDONTWRITEBYTECODE": "1", **more}
 
 
 def printed(variables: dict[str, str], *arguments: str) -> str:
-    """What this interpreter prints."""
+    """Output of this interpreter."""
     command, environment = [sys.executable, *arguments], {**os.environ, **variables}
     return subprocess.check_output(command, env=environment, text=True)  # noqa: S603
 
 
 def same_runs(other: Path, only: list[str]) -> bool:
-    """Print which hashes of the other version differ here; whether none does. What is new here doesn't count."""
+    """Print which hashes of the other version differ here; whether none does."""
     texts = (printed(variables(path), str(HERE / "runs.py"), str(other), *only) for path in (other, ROOT))
     before, now = (
         {(kind, name): digest for kind, name, digest in map(json.loads, text.splitlines())} for text in texts
@@ -89,7 +89,7 @@ def tell_cold_start(other: Path) -> None:
 
 
 def main() -> None:
-    """Compare, and tell by the exit code."""
+    """Compare; the exit code is the result."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("other", type=Path, help="checkout of the other version")
     parser.add_argument("--bits", action="store_true", help="compare runs")

@@ -17,27 +17,27 @@ from typing import Any, NamedTuple
 
 BUILD_S = 20.0
 MEMORY_SHARE = 0.7
-"""Of the machine's memory; with more, a case fails."""
+"""Share of the machine's memory above which a case fails."""
 REPORTED = (
     "uuv_marl", "numpy", "numba", "gymnasium", "pettingzoo", "stable_baselines3", "torch", "mpe2", "vmas", "jaxmarl",
     "jax", "jaxlib", "camar", "supersuit", "ray",
 )  # fmt: skip
-"""Libraries whose versions a case tells if it has imported them."""
+"""Libraries whose versions a case reports if it imports them."""
 
 
 class Case(NamedTuple):
-    """Something to repeat."""
+    """Work to repeat."""
 
     run: Callable[[int], object]
-    """Does so many units of work."""
+    """Run a number of units."""
     amount: float
-    """What a unit holds: agent-steps, or pairs, sines, bytes."""
+    """Content of a unit: agent-steps, pairs, sines or bytes."""
     facts: Mapping[str, object] = {}
-    """What else is worth knowing, for the results file."""
+    """Further data for the results file."""
 
 
 Maker = Callable[[int, int], Case]
-"""Makes a case of so many agents in so many worlds."""
+"""From numbers of agents and worlds to a case."""
 
 
 def repeated(step: Callable[[int], object], amount: float, **facts: object) -> Case:
@@ -61,14 +61,14 @@ def built(make: Callable[[], Any], worlds: int) -> list[Any]:
 
 
 def seconds_of(case: Case, units: int) -> float:
-    """How long so many units take [s]."""
+    """Time of a number of units [s]."""
     start = time.perf_counter()
     case.run(units)
     return time.perf_counter() - start
 
 
 def units_within(case: Case, seconds: float) -> int:
-    """How many units fill this time, found with ever larger trials."""
+    """Number of units that fill this time, found with increasing trials."""
     units, spent = 1, seconds_of(case, 1)
     while spent < seconds / 4:
         units *= min(16, max(2, int(seconds / 2 / spent)))
@@ -100,6 +100,6 @@ def serve(makers: Mapping[str, Maker], warm: bool = False) -> None:
 
 
 def say(**answer: object) -> None:
-    """Answer with one line; time doesn't run until the next."""
+    """Answer with one line."""
     signal.setitimer(signal.ITIMER_REAL, 0.0)
     print(json.dumps(answer), flush=True)

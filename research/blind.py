@@ -1,4 +1,4 @@
-"""``Blind``: another policy that hears no echoes, which shows what its sonar of obstacles is worth."""
+"""``Blind``: another policy without echoes, which shows the value of its obstacle sonar."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -17,11 +17,7 @@ BLIND = "research.blind:Blind,inner="
 
 
 class Blind(Policy):
-    """A network, or any policy with its clock and inner loop, whose percepts tell of no echo.
-
-    Args:
-        inner: its name.
-    """
+    """A network, or any policy with its decision period and yaw damping, without echoes in its percepts."""
 
     requirements = PolicyRequirements(yaw_damping_nms=600.0, decision_period_s=0.5, outputs_force=True)
 
@@ -32,13 +28,13 @@ class Blind(Policy):
         self._mask = np.concatenate(masks).astype(np.float32)
 
     def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
-        """Reset the policy inside, too."""
+        """Reset also the inner policy."""
         super().reset(seed, worlds)
         self._inner.reset(seed, worlds)
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        unheard = dataclasses.replace(percept, flat=percept.flat * self._mask)
+        masked = dataclasses.replace(percept, flat=percept.flat * self._mask)
         self._inner.active = self.active
-        self._inner.update_memory(unheard)
-        return self._inner.decide(unheard)
+        self._inner.update_memory(masked)
+        return self._inner.decide(masked)

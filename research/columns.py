@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from uuv_marl.atomic import replacing
 
 Columns = dict[str, NDArray[Any]]
-"""Columns of one length, numbers or texts. NaN stands for nothing measured."""
+"""Columns of equal length, numbers or texts; NaN for missing values."""
 _DIGITS = 6
 
 
 def columns(rows: Iterable[Mapping[str, Any]]) -> Columns:
-    """A table from its rows, of which there is at least one."""
+    """A table from its rows, at least one."""
     table = list(rows)
     return {name: np.array([row[name] for row in table]) for name in table[0]}
 
@@ -34,7 +34,7 @@ def groups(table: Columns, *names: str) -> dict[tuple[Any, ...], Columns]:
 
 
 def write_columns(path: Path, table: Columns) -> None:
-    """A table as CSV, whole or not at all: texts in quotes, numbers with six significant digits."""
+    """Write a table as CSV atomically: texts in quotes, numbers with six significant digits."""
     path.parent.mkdir(parents=True, exist_ok=True)
     cells = [[written(value) for value in values.tolist()] for values in table.values()]
     with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
@@ -44,12 +44,12 @@ def write_columns(path: Path, table: Columns) -> None:
 
 
 def read_columns(path: Path) -> Columns:
-    """A table that ``write_columns`` wrote."""
+    """Read the file of ``write_columns``."""
     with path.open(newline="", encoding="utf-8") as file:
         head, *rows = csv.reader(file, quoting=csv.QUOTE_NONNUMERIC)
     return {name: np.array([row[k] for row in rows]) for k, name in enumerate(head)}
 
 
 def written(value: Any) -> Any:
-    """The text in the file for a number or a text."""
+    """The value of a cell in the file."""
     return float(f"{value:.{_DIGITS}g}") if isinstance(value, float) else value

@@ -1,4 +1,4 @@
-"""Files that ship with research: what is stated, assumed and said, as TOML and as text."""
+"""Data files of this package, as TOML and as text."""
 
 import tomllib
 from importlib import resources

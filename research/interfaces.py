@@ -1,7 +1,7 @@
 """``python -m research.interfaces SB3-PPO``: what a learner of docs/interfaces.md reaches, as printed there.
 
-It runs the block with a seed of that training, in an environment that has the library, and counts whole swarms on the
-validation seeds.
+It runs the block with a seed of that training, in an environment that has the library, and counts successful
+episodes on the validation seeds.
 """
 
 # pyright: reportUnknownMemberType=false, reportMissingTypeStubs=false
@@ -64,7 +64,7 @@ def printed(learner: Learner, training: int) -> str:
         block = block.replace(was, now) if was in block else ""
     block, count = re.subn(r"(seed[=(])(\d[\d_]*)", lambda at: f"{at[1]}{int(at[2]) + APART * training}", block)
     if not count:
-        raise ResultsError(f"{PAGE.name} must print a block of {learner} with a seed; mend it there")
+        raise ResultsError(f"{PAGE.name} must print a block of {learner} with a seed; correct it there")
     return block
 
 
@@ -108,8 +108,8 @@ def _remembering(model: Any) -> Act:
     return act
 
 
-def whole(act: Act) -> int:
-    """Episodes that end by arrival without a contact."""
+def successes(act: Act) -> int:
+    """Number of episodes that end by arrival without a collision."""
     envs = uuv_marl.vector_env(EPISODES, "starter", autoreset_mode="Disabled")
     seen, _ = envs.reset(seed=FIRST)
     n, begins, ended, good = seen.shape[1], True, np.zeros(EPISODES, np.bool_), 0
@@ -128,7 +128,7 @@ def main(
     learner: Annotated[Learner, typer.Argument(help="What is trained.")],
     training: Annotated[int, typer.Option(min=0, help="Which one; each has another seed.")] = 0,
 ) -> None:
-    """Train by the page's block, and count whole swarms of 100 validation episodes.
+    """Train by the page's block, and count the successes of 100 validation episodes.
 
     Example: python -m research.interfaces SB3-RecurrentPPO --training 2
     """
@@ -139,10 +139,8 @@ def main(
             block.write_text(printed(learner, training), encoding="utf-8")
             namespace = runpy.run_path(str(block), run_name="page")
         took, used = time.perf_counter() - began, time.process_time() - used
-        good = whole(acting(learner, namespace))
-        print(
-            f"{learner}, training {training}: {good} of {EPISODES} whole; {took:.0f} s, {used:.0f} s of processors here"
-        )
+        good = successes(acting(learner, namespace))
+        print(f"{learner}, training {training}: {good} of {EPISODES} succeed; {took:.0f} s, {used:.0f} s of processor")
 
 
 if __name__ == "__main__":

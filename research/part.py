@@ -1,4 +1,4 @@
-"""Parts of the reproduction: tables from runs, and a picture from the tables alone."""
+"""Parts of the reproduction: tables from runs, and a picture from the tables."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -21,13 +21,13 @@ class Part(NamedTuple):
     name: str
     """``figure-11``; names the picture, and the option ``--only``."""
     cases: tuple[Case, ...]
-    """What must have been run; nothing where the tables are computed by themselves, and take their time."""
+    """Required cases; empty where the tables are computed without runs."""
     tables: Callable[[Suite, Share], Tables]
-    """Makes tables from the runs, by name; each becomes ``data/NAME.csv``."""
+    """From the runs to tables by name, each saved as ``data/NAME.csv``."""
     draw: Callable[[Tables], Figure]
-    """Draws the picture from the tables alone."""
+    """From the tables to the picture."""
 
     @property
     def title(self) -> str:
-        """The text above the picture, see ``parts.toml``."""
+        """Text above the picture, see ``parts.toml``."""
         return _TITLES[self.name]

@@ -1,4 +1,4 @@
-"""Second trainings of networks that ship: files, by the names that tables and rows give them."""
+"""Second trainings of the shipped networks: files by their names in tables."""
 
 from pathlib import Path
 
@@ -7,5 +7,5 @@ SECOND = {file.stem: str(file) for file in sorted(Path(__file__).parent.glob("ve
 
 
 def runnable(policy: str) -> str:
-    """What ``make_policy`` takes for a policy's name in a table: a second training's path, any other name as it is."""
+    """The policy of a name in a table: the path of a second training, any other name unchanged."""
     return SECOND.get(policy, policy)

@@ -1,4 +1,4 @@
-"""Sets of episodes as a job: what is missing of every set is run, here, and every finished episode is kept."""
+"""Sets of episodes: missing episodes are run, and every finished one is kept."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -26,7 +26,7 @@ class EpisodeSet(NamedTuple):
     overrides: Mapping[str, object] = NOTHING
 
     def cases(self, most: int | None) -> dict[str, Case]:
-        """All that is run, at most so many seeds of each policy, by its name in tables."""
+        """Cases by the name of the policy in tables, with at most ``most`` seeds each."""
         return {
             policy: Case(self.name, self.scenario, runnable(policy), self.overrides, shared=True, seeds=seeds[:most])
             for policy, seeds in self.seeds.items()
@@ -37,15 +37,7 @@ def run(
     output: Path, sets: Sequence[EpisodeSet], only: Sequence[str], seeds: int | None, metrics: Sequence[str],
     report: Report,
 ) -> list[Row]:  # fmt: skip
-    """Run what is missing, and give the episodes that were asked for.
-
-    Args:
-        output: folder with a benchmark's results for every set; what else it holds is left out.
-        sets: all that there are.
-        only: names of sets; empty for all.
-        seeds: at most so many of every set; all if None.
-        metrics: what is kept of an episode.
-        report: called as it goes on.
+    """Run the missing episodes of the sets named in ``only`` (all if empty), at most ``seeds`` of a policy on a set.
 
     Raises:
         ResultsError: there is no such set, or a folder holds other results.
@@ -57,7 +49,7 @@ def run(
     planned = [pair for each in sets if not only or each.name in only for pair in each.cases(seeds).items()]
     cases = [case for _, case in planned]
     for policy in {case.policy for case in cases}:
-        policy_class(policy)  # refused now, not after hours of others' runs
+        policy_class(policy)  # raises now, not after hours of other runs
     suite = Suite(output, traces=False)
     with ExitStack() as locks:
         for folder in dict.fromkeys(output / case.folder for case in cases):

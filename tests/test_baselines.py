@@ -263,9 +263,9 @@ class Nothing(Policy):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("sff", "link .sonar.channels.*use uuv_marl.baselines.granted"),
-        ("sdc", "compass and link .sonar.channels.*use uuv_marl.baselines.granted"),
-        ("bio_inspired_plus", "yaw damping of 600 .*actuators.yaw_damping_nms.*granted"),
+        ("sff", "link .sonar.channels.*use uuv_marl.baselines.with_policy_requirements"),
+        ("sdc", "compass and link .sonar.channels.*use uuv_marl.baselines.with_policy_requirements"),
+        ("bio_inspired_plus", "yaw damping of 600 .*actuators.yaw_damping_nms.*with_policy_requirements"),
         ("tests.test_baselines:Nothing", r"policy '.*Nothing' must define decide\(percept\)"),
         ("bio_inspired,zeta_m=1", "has no parameter 'zeta_m'; did you mean 'zeta_"),
         ("bio_inspired,zeta_n=x", "the gain zeta_n must be a finite number, got 'x'"),
@@ -328,5 +328,5 @@ def test_a_policy_that_acts_by_a_vehicles_index_declares_it(name):
 
 def test_a_network_around_a_law_that_acts_by_the_index_does_so_too(tmp_path):
     for law, told in {"nearest_target,lanes=true": True, "nearest_target,lanes=false": False}.items():
-        checkpoint = saved(tmp_path, load_scenario("silent_targets"), around=law)
+        checkpoint = saved(tmp_path, load_scenario("silent_targets"), base_controller=law)
         assert policy_requirements(checkpoint).identity is told

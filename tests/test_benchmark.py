@@ -13,7 +13,7 @@ from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.estimates import estimate
-from uuv_marl.benchmark.evaluate import Run, episodes
+from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.results import Results, ResultsError
 from uuv_marl.benchmark.tables import Table, terminal_table
 from uuv_marl.cli import app
@@ -27,11 +27,7 @@ def quick(name="single_obstacle"):
 
 
 def runs_of(scenario, policy, seeds):
-    return {
-        run.seed: run
-        for run in episodes(with_policy_requirements(policy, scenario), policy, seeds)
-        if isinstance(run, Run)
-    }
+    return {run.seed: run for run in episodes(with_policy_requirements(policy, scenario), policy, seeds)}
 
 
 def test_metrics_are_those_of_the_series(monkeypatch):
@@ -201,7 +197,7 @@ def test_between_walls_tuning_pays_for_who_arrives_untouched_and_for_time():
     from uuv_marl.benchmark.tuning import MAPS, SPACES, tuning_cost
 
     scenario = load_scenario("hard_water", num_vehicles=2)
-    idle = next(run for run in episodes(scenario, "idle", MAPS[:1]) if isinstance(run, Run))
+    idle = next(run for run in episodes(scenario, "idle", MAPS[:1]))
     assert tuning_cost(idle, scenario) == pytest.approx(1000.0 + idle.routes.time_s[-1])
     half = idle._replace(metrics=idle.metrics | {"task": {"success_share": 0.5}})
     assert tuning_cost(half, scenario) == pytest.approx(500.0 + idle.routes.time_s[-1])

@@ -53,7 +53,7 @@ def swim(overrides, decisions=40, worlds=1, seed=3, scenario=STARTER, **change):
     return swarm
 
 
-# --- Off is as before ---
+# --- Without disturbances ---
 
 
 @pytest.mark.parametrize("channel", DISTURBANCE_CHANNELS)
@@ -95,8 +95,8 @@ def test_a_snapshot_resumes_bit_for_bit():
             each.step(np.full((1, 5, 2), 0.4))
     for name, array in swarm.snapshot().items():
         np.testing.assert_array_equal(array, other.snapshot()[name], name)
-    kept["detected_index"][:] = 5
-    with pytest.raises(ValueError, match="whom must lie within -3 and 4"):
+    kept["target_index"][:] = 5
+    with pytest.raises(ValueError, match="target_index must lie within -3 and 4"):
         swarm.restore(kept)
 
 

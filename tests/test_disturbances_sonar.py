@@ -94,7 +94,7 @@ def same(ours, theirs, names=SONAR, where=np.s_[:]):
         assert ours[name][where].tobytes() == theirs[name][where].tobytes(), name
 
 
-# --- Off ---
+# --- Without disturbances ---
 
 
 def test_readings_without_delay_and_error_change_no_bit():
@@ -106,7 +106,7 @@ def test_readings_without_delay_and_error_change_no_bit():
             same(ours, theirs, names=ours)
 
 
-# --- Late ---
+# --- Latency ---
 
 
 @pytest.mark.parametrize(("every", "delay", "holds"), [*itertools.product([1.0, 2.5, 7.0], [0, 1, 3, 20], [1, 5])])
@@ -196,7 +196,7 @@ def test_sound_shows_vehicles_where_they_were():
     assert np.abs(frames[-1]["neighbour"] - ideal[-1]["neighbour"]).max() > 0.5
 
 
-# --- Wrong ---
+# --- Errors ---
 
 
 def polar(points):
@@ -381,7 +381,7 @@ def test_an_array_with_a_fault_detects_nothing():
                 same(ours, theirs, where=np.s_[i])
 
 
-# --- Draws ---
+# --- Random numbers ---
 
 
 @pytest.mark.parametrize(

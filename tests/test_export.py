@@ -45,7 +45,7 @@ def test_an_exported_network_acts_as_the_policy_does(arrays, kind, memory, tmp_p
 
 @pytest.mark.parametrize("policy", ["bio_inspired", "scout", "mappo,safety_filter=true"])
 def test_what_is_no_network_end_to_end_is_refused_with_the_remedy(policy, tmp_path):
-    with pytest.raises(PolicyError, match=rf"'{policy}' can't be exported.*not laws.*run this policy with"):
+    with pytest.raises(PolicyError, match=rf"'{policy}' can't be exported.*not controllers.*run this policy with"):
         write_onnx(policy, load_scenario("tracking"), tmp_path / "policy.onnx")
     assert not list(tmp_path.iterdir())
 
@@ -89,7 +89,7 @@ def test_a_shipped_network_is_exported_by_its_name(name, tmp_path, monkeypatch):
 
 
 def test_the_command_names_what_it_can_not_export():
-    for policy, told in {"scout": "not laws", "mapo": "did you mean 'mappo'", "runs/none": "can't be read"}.items():
+    for policy, told in {"scout": "not controllers", "mapo": "did you mean 'mappo'", "runs/none": "can't be read"}.items():
         done = CliRunner().invoke(app, ["export", policy, "policy.onnx"])
         assert done.exit_code == 2
         assert told in done.output

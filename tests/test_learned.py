@@ -71,7 +71,7 @@ def test_an_encoder_reads_sub_sectors_in_any_order_with_their_places():
             t[name] = rng.standard_normal(shape).astype(np.float32)
         x, order = rng.standard_normal((4, 8 + 3 * num)).astype(np.float32), rng.permutation(num)
         turned = x.copy()
-        turned[:, sectors["detected"].ravel()] = x[:, sectors["detected"][order].ravel()]
+        turned[:, sectors["heard"].ravel()] = x[:, sectors["heard"][order].ravel()]
         seen = Network(made, sizes, t, NumpyOps).features(x)
         again = Network(made, sizes, {**t, "heard.place": t["heard.place"][order]}, NumpyOps).features(turned)
         np.testing.assert_allclose(seen, again, atol=1e-6)
@@ -179,7 +179,7 @@ def test_it_works_for_any_size_and_declares_what_it_needs(best):
     for n in (1, 200):
         scenario = with_policy_requirements(best, load_scenario("tracking", num_vehicles=n))
         assert make_policy(best, scenario).act(Swarm(scenario).reset(0)).shape == (1, n, 2)
-    with pytest.raises(PolicyError, match="yaw damping of 600.*granted"):
+    with pytest.raises(PolicyError, match="yaw damping of 600.*with_policy_requirements"):
         make_policy(best, load_scenario("tracking"))
 
 
@@ -193,7 +193,7 @@ def test_another_percept_or_period_is_refused_with_the_remedy(best):
     assert with_policy_requirements(best, slow).timing.decision_period_s == 0.1
     fixed = with_policy_requirements(best, water(**{"timing.decision_period_s": 0.5, "timing.fixed": True}))
     odd = {"timing.control_step_s": 0.2, "timing.integration_step_s": 0.2, "timing.decision_period_s": 0.2}
-    with pytest.raises(ScenarioError, match="can't run on scenario 'tracking' with what it declares: .*multiple"):
+    with pytest.raises(ScenarioError, match="can't run on scenario 'tracking' with what it requires: .*multiple"):
         with_policy_requirements(best, water(**odd))
     for other in (slow, fixed):
         with pytest.raises(PolicyError, match=r"needs a decision every 0.1 s .timing.decision_period_s."):

@@ -161,7 +161,7 @@ def test_cos_sin_is_the_library_s_even_and_odd():
     assert all(map(math.isnan, cos_sin(math.nan)))
 
 
-# --- Neighbours, distances, contacts ---
+# --- Neighbours, distances, collisions ---
 
 
 def array(name, mounting, aperture, sub_sectors, range_m, kind="passive"):

@@ -5,12 +5,12 @@ import pytest
 
 from uuv_marl import load_scenario
 from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.benchmark.evaluate import Run, episodes
+from uuv_marl.benchmark.evaluate import episodes
 
 
 def over_seeds(scenario, policy="bio_inspired"):
     loaded = with_policy_requirements(policy, load_scenario(scenario))
-    runs = [run.metrics for run in episodes(loaded, policy, list(range(20))) if isinstance(run, Run)]
+    runs = [run.metrics for run in episodes(loaded, policy, list(range(20)))]
     assert len(runs) == 20
     return {name: [run[name] for run in runs] for name in runs[0]}
 

@@ -17,7 +17,7 @@ import uuv_marl.replay.encode
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.benchmark import runner
-from uuv_marl.benchmark.evaluate import Run, episodes
+from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import ReplayError, ResultsError
@@ -47,7 +47,7 @@ def rough(**changes):
 
 def run_of(scenario, policy, seed, watch=None):
     events = episodes(with_policy_requirements(policy, scenario), policy, [seed], watch)
-    return next(event for event in events if isinstance(event, Run))
+    return next(event for event in events)
 
 
 def test_a_recording_is_the_benchmarks_run():

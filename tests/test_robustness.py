@@ -91,9 +91,9 @@ TINY = job.Plan(("A1", "C1"), (1, 5), ("starter",), ("bio_inspired",), 1)
 def test_a_cell_that_is_done_is_not_run_again(tmp_path, monkeypatch):
     asked = []
 
-    def counted(scenario, policy, seeds, **parameters):
+    def counted(scenario, policy, seeds, *hooks, **parameters):
         asked.extend(seeds)
-        yield from episodes(scenario, policy, seeds, **parameters)
+        yield from episodes(scenario, policy, seeds, *hooks, **parameters)
 
     monkeypatch.setattr("uuv_marl.benchmark.runner.episodes", counted)
     first = job.run(tmp_path, TINY, silent).read_bytes()

@@ -8,7 +8,7 @@ from uuv_marl.baselines import Policy, PolicyError, make_policy, with_policy_req
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
-from uuv_marl.benchmark.evaluate import Run, episodes
+from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.sim.swarm import Swarm
 
 
@@ -121,7 +121,7 @@ def test_policies_that_collide_alone_do_not_inside_the_filter(name):
     collisions = {}
     for policy in (name, f"{name},safety_filter=true"):
         scenario = with_policy_requirements(policy, load_scenario("random_field"))
-        runs = [run for run in episodes(scenario, policy, [10_007]) if isinstance(run, Run)]
+        runs = list(episodes(scenario, policy, [10_007]))
         collisions[policy] = sum(run.metrics["collisions"] for run in runs)
     assert collisions[name] > 0
     assert collisions[f"{name},safety_filter=true"] == 0
@@ -147,6 +147,6 @@ def test_scout_arrives_and_touches_nothing(echoes):
     scenario = with_policy_requirements(
         "scout", load_scenario("random_field", overrides={"sonar.echo_reports": echoes})
     )
-    runs = [run for run in episodes(scenario, "scout", [10_007, 10_008]) if isinstance(run, Run)]
+    runs = list(episodes(scenario, "scout", [10_007, 10_008]))
     assert all(run.metrics["collisions"] == 0 for run in runs)
     assert all(run.metrics["task_time_s"] is not None for run in runs)

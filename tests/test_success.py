@@ -6,7 +6,7 @@ import pytest
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.benchmark.evaluate import Run, episodes
+from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.sim.swarm import Swarm
@@ -149,7 +149,6 @@ def test_an_episode_that_arrival_does_not_end_goes_on_as_it_was():
         next(
             event
             for event in episodes(with_policy_requirements("bio_inspired_plus", scenario), "bio_inspired_plus", [3])
-            if isinstance(event, Run)
         )
         for scenario in (load_scenario("starter"), load_scenario("starter", overrides=LONG))
     )

@@ -43,7 +43,7 @@ def test_the_page_by_hand():
     done += [*rows("sdc", 0.3), *rows("mappo", 0.75), *rows("research.blind:Blind,inner=mappo", 0.25)]
     text = report("hard_water", done)
     assert "| scout | .50 [.50, .50], .00 | .50 [.50, .50], .00 | .50 [.50, .50], .00 |" in text
-    assert "| oracle with way, link | 1.00, .00 | 1.00, .00 |" in text
+    assert "| oracle with path, link | 1.00, .00 | 1.00, .00 |" in text
     assert "| sdc with compass, link, identity | .30, .00 | .30, .00 |" in text
     assert "| scout |" + " .50, .00 |" * 7 + " 1.00 | 0.10 | 1.0 m | 1.0 m |" in text
     assert "| mappo | .75 [.75, .75], .00 | .25 [.25, .25] | .75 [.75, .75], .00 | .25 [.25, .25] |" in text

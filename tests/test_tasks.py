@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import uuv_marl
 from uuv_marl import load_scenario
 from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.benchmark.evaluate import Run, episodes
+from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.figures import _outcome
 from uuv_marl.benchmark.frame import load
 from uuv_marl.cli import app
@@ -289,7 +289,7 @@ def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():
         assert (mine.timing.decision_period_s, mine.actuators.yaw_damping_nms) == (0.5, 600.0)
     own = with_policy_requirements("bio_inspired,own_clock=true", scenario)
     assert (own.timing.decision_period_s, own.actuators.yaw_damping_nms) == (0.1, 0.0)
-    (run,) = [event for event in episodes(own, "bio_inspired,own_clock=true", [0]) if isinstance(event, Run)]
+    (run,) = episodes(own, "bio_inspired,own_clock=true", [0])
     assert run.metrics["task_time_s"] is not None
 
 
@@ -371,5 +371,5 @@ def test_a_users_task_is_trained_and_the_policy_runs(tmp_path):
     assert np.isfinite(rewards).all()
     policy = str(tmp_path / "a" / "best")
     scenario = with_policy_requirements(policy, load_scenario("starter", overrides={"task": EXAMPLE}))
-    (run,) = [event for event in episodes(scenario, policy, [0]) if isinstance(event, Run)]
+    (run,) = episodes(scenario, policy, [0])
     assert run.metrics["task"]["spread_m"] > 0.0

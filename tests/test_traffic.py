@@ -23,8 +23,8 @@ HOLD_S, N = 0.1, 3
 FINE = {"timing.decision_period_s": HOLD_S, "swarm.num_vehicles": N}
 
 
-def scenario(name="starter", speed_mps=2.0, way_m=8.0, share=1.0, **changes):
-    traffic = {"traffic.speed_mps": speed_mps, "traffic.amplitude_m": way_m, "traffic.share": share}
+def scenario(name="starter", speed_mps=2.0, amplitude_m=8.0, share=1.0, **changes):
+    traffic = {"traffic.speed_mps": speed_mps, "traffic.amplitude_m": amplitude_m, "traffic.share": share}
     return load_scenario(name, overrides={**FINE, **traffic, **changes})
 
 
@@ -43,7 +43,7 @@ def discs(made, w=0):
     return made.world_map.obstacles[w, : made.world_map.num_obstacles[w]].copy()
 
 
-# How they move
+# --- Motion ---
 
 
 @settings(max_examples=15)
@@ -117,7 +117,7 @@ def test_off_is_as_if_there_were_no_such_section(off):
         np.testing.assert_array_equal(made.snapshot()[name], array, err_msg=name)
 
 
-# What vehicles hear and touch
+# --- Echoes and collisions ---
 
 
 @pytest.mark.parametrize("echo", ["centre", "surface"])
@@ -179,7 +179,7 @@ def test_a_hull_that_is_pushed_keeps_at_the_surface_and_is_left_behind():
     assert made.facts.clearance[0, 0] > 2.0
 
 
-# The same run, whatever runs it
+# --- Determinism ---
 
 
 def test_a_batch_and_a_snapshot_give_the_same_run():
@@ -214,7 +214,7 @@ def test_interfaces_agree_and_the_global_state_has_the_velocity():
     assert len(parallel.state()) == 8 + len(uuv_marl.parallel_env(scenario("multi_obstacle", 0.0)).state_space.low)
 
 
-# What is refused, told and shown
+# --- Errors, headers and replays ---
 
 
 @pytest.mark.parametrize(

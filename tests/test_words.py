@@ -14,7 +14,7 @@ WORDS = {
     r"\bgrant(s|ed)?\b": r"\bresearch grants?\b",
     r"\b(is|are|was|were|be|been|never) told\b|\btells? (the|a|its|every|each|which|how|where)\b(?! difference)": "",
     r"\btold (apart|of|by|beyond)\b|\btells?\b[^.;:|]{0,30}\bapart\b": "",
-    r"\b(vehicles?|swarms?|robots?|agents?|neighbours?|polic(y|ies))\b,? (for |of |to )?who(m|se)?\b": "",
+    r"\b(vehicles?|swarms?|robots?|agents?|neighbours?|polic(y|ies))\b,? (for |of |to )?whom?\b": "",
     r"(?:^|[.;:] |\| )Who(m|se)?\b(?![^.|]*\?)": "",
     r"\b(no|every|any|some)body\b": "",
     r"\bwish(ed|es)?\b": "",
@@ -22,10 +22,12 @@ WORDS = {
     r"\b(hears?|heard|hearing)\b": "",
     r"\b(ears?|desks?)\b": "",
     r"\broom (to work|for (draws|half-planes|a choice|all))\b|\brooms? of (its|their) own\b": "",
-    r"\b(pays?|paid|payments?|paying)\b": r"\bpay(s|ing)? (attention|off)\b|\bpaid (for|by) (the )?(grant|licen[cs]e)\b",
+    r"\b(pays?|paid|payments?|paying)\b": r"\bpay(s|ing)? (attention|off)\b|\bpaid (for|by) (the )?licen[cs]e\b",
     r"\blessons?\b": r"\bLessons from\b",
     r"\bteachers?\b|\b(is|are|was|were) taught\b": "",
-    r"\bhand-made laws?\b|\b(the|a|this|each|our|its|any|every|best|strongest|paper's) laws?\b|\blaws\b": r"\blaws? of (physics|motion|thermodynamics|large numbers)\b|\bby law\b",
+    r"\b(the|a|this|each|our|its|any|every|best|strongest|paper's|hand-made) laws?\b|\blaws\b": (
+        r"\blaws? of (physics|motion|thermodynamics|large numbers)\b|\b(control|power) laws?\b"
+    ),
     r"\bfree ways?\b|\bthe way (to|from|through|past|of|is|leads)\b|\bways? (through|that leads?|to go)\b"
     r"|\bshortest ways?\b": r"\bon the way (to|from)\b|\bthe way to (use|do|write|run|install)\b",
     r"\b(came|comes?) there\b|\b(came|comes?) to (a|the|its|their) goals?\b": "",
@@ -34,14 +36,13 @@ WORDS = {
     r"\buntouched\b|\btouch(es|ed|ing)? (nothing|anything|something)\b": "",
     r"\bcontacts?\b": r"\bcontact (us|the|form|details|force)\b|\bprivate contact\b|\bcontacts? in\b",
     r"\bcontrol holds?\b": "",
-    r"\bthe sea\b|\bseas\b|\bat sea\b|\bin sea\b": r"\b(under|over) the sea\b",
-    r"\bcourses?\b": r"\b(of|in the|in due) course\b|\bcollision course\b|\bcourse (stability|angle|over ground|keeping)\b",
+    r"\bthe sea\b|\bseas\b|\bat sea\b": r"\b(under|over) the sea\b",
+    r"\bcourses?\b": r"\b(of|in the|in due|collision) course\b|\bcourse (stability|angle|over ground|keeping)\b",
     r"\bmend(s|ed|ing)?\b": "",
     r"\bdraws? the (same|next) (maps?|sea)\b|\bdraws of\b": "",
     r"\b(goe?s?|went|gone) astray\b|\bknows? (itself|of itself|where it is)\b": "",
     r"\bbeside (a|the|its) network\b|\baround a law\b": "",
-    r"(?<!there )\b(is|are) no (?!longer|more|less|other|faster|slower|larger|smaller|wider|nearer|better|worse|\w+ than)"
-    r"[a-z]+\b": r"\bthere (is|are) no\b",
+    r"\b(is|are) no (?!longer|later|more|less|other|\w+er\b|worse|one\b)[a-z]+\b": r"\b[Tt]here (is|are) no\b",
     r"\bma(kes?|de) good\b|\bma(kes?|de) up for\b": "",
     r"\bpull(s|ed)? to(wards)? (the|a|its) (teacher|expert)\b": "",
 }
@@ -94,9 +95,10 @@ def test_messages_use_the_terms_of_the_field():
 @pytest.mark.parametrize(
     "text",
     [
-        "Vehicles move in water_velocity under a control law.", "There is no obstacle.", "Is there a way to stop early?",
+        "Vehicles move in water_velocity under a control law.", "There is no obstacle.", "Is there a way to stop?",
+        "Vehicles whose goals lie in sea water drift.",
         "Of course, the collision course is stable.", "It is no longer needed; it is no faster than NumPy.",
-        "Contact the maintainers, who are volunteers.", "The way that a policy acts is fixed.", "The task is by far done.",
+        "Contact the maintainers, who are volunteers.", "The way that a policy acts is fixed.",
         "What is there to see?", "We recommend amendments.", "A force beyond the limit is clipped.",
         "Who is it for?", "People who train policies start here.",
     ],

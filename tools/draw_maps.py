@@ -1,4 +1,4 @@
-"""Draw docs/figures/hard_water.png: one map of each kind of hard water, with the start, the goal and a shortest way."""
+"""Draw docs/figures/hard_water.png: one map of each kind, with start, goal and a shortest path."""
 
 from pathlib import Path
 
@@ -13,11 +13,11 @@ from uuv_marl.tasks.maps.kinds import KINDS
 
 ROOT = Path(__file__).resolve().parent.parent
 SEED = 10_000
-"""Of the maps; a tuning seed, so that no reported one is shown."""
+"""Seed of the maps: a tuning seed, so that no reported map is shown."""
 
 
 def way(discs: np.ndarray, length: float, task: object) -> np.ndarray:
-    """A shortest way from the start to the goal that keeps the clearance, shape (point, 2) [m]."""
+    """A shortest path from the start to the goal that keeps the clearance, shape (point, 2) [m]."""
     numbers = task.numbers
     grid = numbers.grid()
     goal = grid.cell(length, 0.0)
@@ -53,7 +53,7 @@ def main() -> None:
             ax.set(title=kind, xlim=(-100.0, 490.0), ylim=(-130.0, 130.0), aspect="equal")
         for ax in axes[len(KINDS) :]:
             ax.set_axis_off()
-        figure.supxlabel("along the way to the goal [m]")
+        figure.supxlabel("along the path to the goal [m]")
         save(figure, ROOT / "docs" / "figures" / "hard_water.png")
 
 

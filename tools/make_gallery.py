@@ -15,7 +15,7 @@ from uuv_marl.scenario import load_scenario
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "gallery"
 SIZE, LASTS_S, COLUMNS = (440, 520), 5.0, 3
-"""Of a film [px], how long it runs [s], and how many stand side by side."""
+"""Size of a film [px], its duration [s], and the number of films side by side."""
 _DATA = tomllib.loads(Path(__file__).with_name("gallery.toml").read_text(encoding="utf-8"))
 
 
@@ -24,17 +24,17 @@ class Film(NamedTuple):
 
     title: str
     words: str
-    """What is seen."""
+    """Description of the film."""
     scenario: str
     policy: str
     seed: int = 10_100
     kind: str = ""
-    """Of hard water."""
+    """Kind of map."""
     camera: str = "follow"
 
     @property
     def name(self) -> str:
-        """Of the file."""
+        """Name of the file."""
         return "-".join(filter(None, (self.scenario, self.kind)))
 
 
@@ -53,7 +53,7 @@ def page() -> str:
 
 
 def main() -> None:
-    """Make the page, and films and demo: all, or those whose names are given."""
+    """Write the page, and all films and the demo, or those named."""
     (ROOT / "docs" / "gallery.md").write_text(page(), encoding="utf-8")
     if len(sys.argv) == 1 or "demo" in sys.argv[1:]:
         episodes = [record(load_scenario(demo.SCENARIO), policy, demo.SEED) for policy in demo.POLICIES]

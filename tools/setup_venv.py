@@ -1,6 +1,6 @@
-"""Make a virtual environment and install into it what it is for: setup_venv.py NAME. Explains what is missing.
+"""Create a virtual environment and install its packages: setup_venv.py NAME. Explains what is missing.
 
-Written for any Python 3, so that one that is too old hears why.
+Written for any Python 3, so that one that is too old gets an explanation.
 """
 
 import os
@@ -36,7 +36,7 @@ def stop(message):
 
 
 def check_python():
-    """Stop where this interpreter can't carry uuv_marl: the versions that it may have stand in pyproject.toml."""
+    """Stop where pyproject.toml does not allow this version of Python."""
     with open(os.path.join(ROOT, "pyproject.toml")) as file:
         ends = re.search(r'requires-python = ">=(\d+)\.(\d+),<(\d+)\.(\d+)"', file.read()).groups()
     low, high = tuple(map(int, ends[:2])), tuple(map(int, ends[2:]))
@@ -58,7 +58,7 @@ def check_python():
 
 
 def run(*command):
-    """Run a command, or stop with what it was."""
+    """Run a command; stop with its text if it fails."""
     if subprocess.call(command, cwd=ROOT) != 0:
         stop("This failed: %s\nRead the lines above; 'make clean' removes half-made environments." % " ".join(command))
 

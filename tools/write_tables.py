@@ -144,7 +144,7 @@ TABLES = filled() | {
 
 
 def written(page: Path) -> str:
-    """A page with every marked table written anew."""
+    """A page with every marked table written again."""
     filled_table = lambda found: f"<!-- {found[1]} -->\n{TABLES[found[1]]}\n<!-- /{found[1]} -->"  # noqa: E731
     return MARKED.sub(filled_table, page.read_text(encoding="utf-8"))
 

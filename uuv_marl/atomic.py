@@ -56,13 +56,7 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
 
     The operating system holds the lock and frees it when the process ends. Two hidden files remain in the folder:
     ``.lock``, and while locked ``.owner``, which names the process. A folder created here that stays empty is removed.
-
-    Args:
-        folder: folder to lock.
-        wait_s: longest wait for another context to end [s].
-
-    Raises:
-        ResultsError: another context has locked the folder, in this process or another, or it can't be written.
+    Waits up to ``wait_s`` [s] for another context to end, in this process or another; then raises ResultsError.
     """
     lock, owner, is_new = FileLock(folder / _LOCK), folder / _OWNER, not folder.exists()
     with writing(folder):

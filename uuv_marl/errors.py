@@ -40,7 +40,7 @@ class MissingExtraError(ModuleNotFoundError):
     """A library of one of the package's extras is missing; the message names the command that installs it."""
 
 
-MENDABLE = (
+USER_ERRORS = (
     ScenarioError, PolicyError, DivergenceError, ResultsError, ReplayError, TrainingError, RewardError, PictureError,
     MissingExtraError,
 )  # fmt: skip

@@ -10,14 +10,9 @@ from uuv_marl.errors import MissingExtraError, PictureError
 
 @contextmanager
 def extra(name: str, what: str | None = None) -> Iterator[None]:
-    """Context for imports of an extra's libraries.
+    """Context for imports of the extra ``name``'s libraries, which ``what`` needs (by default the import itself).
 
-    Args:
-        name: name of the extra, as in ``pip install 'uuv_marl[train]'``.
-        what: feature that needs the library, for the message; by default the import itself.
-
-    Raises:
-        MissingExtraError: one of the libraries is missing.
+    Raises MissingExtraError, which names ``pip install 'uuv_marl[name]'``, if a library is missing.
     """
     try:
         yield

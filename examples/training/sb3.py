@@ -19,12 +19,12 @@ TRAINING_SEEDS = 100_000  # the benchmark and the tuning use smaller ones
 
 def make_env(scenario: str, num_worlds: int) -> VecNormalize:
     """Worlds in which every vehicle is a row."""
-    # Closeness instead of positions: what checkpoints read. Rewards are put into one scale, observations are in one.
+    # Checkpoints read closeness instead of positions. Rewards are normalised; observations already are.
     return VecNormalize(SwarmVecEnv(scenario, num_worlds, observe="closeness"), norm_obs=False)
 
 
 def train(scenario: str, steps: int, num_worlds: int, seed: int) -> PPO:
-    """A model that has learned for so many agent-steps: decisions times vehicles."""
+    """A model trained for a number of agent-steps: decisions times vehicles."""
     model = PPO(
         "MlpPolicy",
         make_env(scenario, num_worlds),
@@ -41,7 +41,7 @@ def train(scenario: str, steps: int, num_worlds: int, seed: int) -> PPO:
 
 
 def main() -> None:
-    """Train as the command line says."""
+    """Train with the options of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenario", default="starter", help="name or TOML file; training_field is the next")
     parser.add_argument("--steps", type=int, default=300_000, help="decisions times vehicles")
@@ -53,9 +53,8 @@ def main() -> None:
     arguments.output.mkdir(parents=True, exist_ok=True)
     model.save(arguments.output / "model")  # for PPO.load, to train on
     save_sb3(model, arguments.output / "policy.safetensors")
-    print(
-        f"The policy is in {arguments.output}: uuv-marl benchmark --scenario {arguments.scenario} --policy {arguments.output}"
-    )
+    command = f"uuv-marl benchmark --scenario {arguments.scenario} --policy {arguments.output}"
+    print(f"The policy is in {arguments.output}: {command}")
 
 
 if __name__ == "__main__":

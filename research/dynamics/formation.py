@@ -38,14 +38,7 @@ class Formation(NamedTuple):
 def straight_leg(
     num_vehicles: int = 54, yaw_damping_nms: float = 0.0, control_step_s: float = 0.1, leg_m: float = 4000.0
 ) -> Scenario:
-    """Open water and one leg to the north from the origin; all clocks have the same period.
-
-    Args:
-        num_vehicles: size of the swarm.
-        yaw_damping_nms: torque against the yaw rate [N m s]; 0 for none, as in the paper.
-        control_step_s: control step, integration step and decision period [s].
-        leg_m: length of the leg [m].
-    """
+    """Open water and one leg to the north from the origin; all clocks have the same period."""
     clocks = ("control_step_s", "integration_step_s", "decision_period_s")
     overrides = {f"timing.{clock}": control_step_s for clock in clocks} | {
         "trajectory.waypoints_m": [[0.0, 0.0], [leg_m, 0.0]],
@@ -101,12 +94,6 @@ def formations(
     """A formation from each seed's start: relaxed with fresh neighbour sets, then solved with frozen ones.
 
     Where no balance is found, the relaxed state with the smallest residual of the second half stands for it.
-
-    Args:
-        scenario: one straight leg to the north, see ``straight_leg``.
-        gains: of the controller.
-        seeds: of the starts; one formation each.
-        rounds: relaxation steps towards a formation.
     """
     swarm = Swarm(scenario, len(seeds))
     swarm.reset(list(seeds))

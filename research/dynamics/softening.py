@@ -27,14 +27,7 @@ PAPER = Softening()
 
 
 class Softened(BioInspired):
-    """The paper's controller with a ``Softening``, in NumPy; without one it equals ``BioInspired``, an echo per beam.
-
-    Args:
-        scenario: gives the vehicle's limits and the percept's layout.
-        num_worlds: first axis of the percepts.
-        gains: Table 1 by default.
-        softening: the changes; none by default.
-    """
+    """The paper's controller with a ``Softening``, in NumPy; without one it is ``BioInspired``, an echo per beam."""
 
     def __init__(
         self,

@@ -91,7 +91,7 @@ def case(values: Mapping[str, Value], scenario: str, seeds: Sequence[int] | None
 
 def runs(of: Case) -> Iterator[Run]:
     """Episodes of a case."""
-    return (run for run in episodes(of.load(), of.policy, of.seeds or (), **of.parameters) if isinstance(run, Run))
+    return episodes(of.load(), of.policy, of.seeds or (), **of.parameters)
 
 
 def measure(values: Mapping[str, Value], seeds: Sequence[int] = SEEDS) -> Numbers:
@@ -116,7 +116,7 @@ def measure(values: Mapping[str, Value], seeds: Sequence[int] = SEEDS) -> Number
 def errors(numbers: Numbers) -> tuple[float, ...]:
     """How far the paper's numbers are missed, relative, by ``OBJECTIVES``; from 0 to 1, above 1 where runs fail.
 
-    An obstacle distance between the paper's two for one case is no error. Any swarm that always arrives without a
+    An obstacle distance between the paper's two for one case is not an error. Any swarm that always arrives without a
     collision is better in all three than any that doesn't.
     """
     if numbers.failed:

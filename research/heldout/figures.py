@@ -19,7 +19,7 @@ ENDS = {
     "never arrives, with a collision": (False, True, ORANGE, "////"),
     "never arrives, no collision": (False, False, "0.8", ""),
 }
-"""How an episode ends: whether it arrives, whether anybody collides, and how that is drawn."""
+"""Endings of an episode: whether it arrives, whether there is a collision, and its colour and hatch."""
 
 
 def draw_fields(rows: Sequence[Row], path: Path) -> Path:

@@ -1,4 +1,4 @@
-"""``heldout.md``: how often each policy arrives and touches nothing, written from the rows of the episodes alone."""
+"""``heldout.md``: how often each policy arrives without a collision, written from the rows of the episodes."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,9 +12,8 @@ from research.heldout.figures import draw_fields
 from research.heldout.sets import FIRST, GROUPS, SETS
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.style import house_style
-from uuv_marl.benchmark.tables import markdown_table
+from uuv_marl.benchmark.tables import NOTHING, markdown_table
 
-_NOTHING = "–"
 _MAIN = "random_field"
 """The set of the second table and of the picture."""
 Groups = Mapping[tuple[str, ...], Sequence[Row]]
@@ -22,7 +21,7 @@ Groups = Mapping[tuple[str, ...], Sequence[Row]]
 
 
 def write_page(folder: Path, rows: Sequence[Row]) -> list[Path]:
-    """``heldout.md`` with its picture, and its rows; the paths."""
+    """Write ``heldout.md`` with its picture and rows; return the paths."""
     page, table = folder / "heldout.md", folder / "heldout.csv.gz"
     write_rows(table, rows)
     write_text(page, report(rows))
@@ -32,7 +31,7 @@ def write_page(folder: Path, rows: Sequence[Row]) -> list[Path]:
 
 
 def tables(rows: Sequence[Row]) -> tuple[str, str]:
-    """How many episodes arrive untouched in each set, and what the episodes on random fields are like."""
+    """Collision-free arrivals in each set, and measures of the episodes on random fields, as two tables."""
     groups = grouped(rows, "policy", "set")
     policies = [name for names in GROUPS.values() for name in names if any(name == policy for policy, _ in groups)]
     return _sets(groups, policies), _fields(groups, policies)
@@ -47,18 +46,18 @@ def report(rows: Sequence[Row]) -> str:
 
 
 def _sets(groups: Groups, policies: Sequence[str]) -> str:
-    """How many episodes arrive untouched: a row for each policy, a column for each set."""
+    """Collision-free arrivals: a row for each policy, a column for each set."""
     names = [held.name for held in SETS if any(held.name == name for _, name in groups)]
     rows = [(policy, *(_share(groups.get((policy, name), ())) for name in names)) for policy in policies]
     return markdown_table(("policy", *(name.removeprefix("random_field_") for name in names)), rows)
 
 
 def _share(mine: Sequence[Row]) -> str:
-    return f"{sum(map(succeeded, mine))}/{len(mine)}" if mine else _NOTHING
+    return f"{sum(map(succeeded, mine))}/{len(mine)}" if mine else NOTHING
 
 
 def _fields(groups: Groups, policies: Sequence[str]) -> str:
-    """What the episodes on random fields are like: a row for each policy."""
+    """Measures of the episodes on random fields: a row for each policy."""
     rows = [(policy, *_cells(mine)) for policy in policies if (mine := groups.get((policy, _MAIN), ()))]
     head = ("policy", "arrived", "collided", "mean time [s]", "nearest obstacle [m]", "nearest vehicle [m]")
     return markdown_table(head, rows)
@@ -69,7 +68,7 @@ def _cells(mine: Sequence[Row]) -> tuple[str, ...]:
     return (
         f"{len(times)}/{len(mine)}",
         f"{sum(row['collisions'] != '0' for row in mine)}",
-        f"{np.mean(times):.1f}" if times else _NOTHING,
+        f"{np.mean(times):.1f}" if times else NOTHING,
         f"{min(measured(mine, 'min_obstacle_distance_m')):.2f}",
         f"{min(measured(mine, 'min_spacing_m')):.2f}",
     )

@@ -1,4 +1,4 @@
-"""``python -m research.learners``: learners x tasks x trainings by one protocol, and the page that tells of them."""
+"""``python -m research.learners``: learners x tasks x trainings by one protocol, and their page."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -34,7 +34,7 @@ def main(
     """Train every learner on every task, run what it learned in the final episodes, and write learners.md.
 
     Several processes may share the folder: run the command once for each core. Each takes the next training that
-    nobody has begun, and whoever finds all of them done writes the page. A training that was cut off begins anew.
+    no process has started, and the process that finds all done writes the page. An interrupted training starts again.
 
     Example: python -m research.learners --task hard_water --learner MAPPO --trainings 1
     """
@@ -51,12 +51,12 @@ def main(
                 )
                 _make(cell, cell.folder(output), report)
             if task is None and learner is None:
-                _write(chosen, output, progress_line(bar, "laws"))
+                _write(chosen, output, progress_line(bar, "controllers"))
         console.print(f"  {output}", highlight=False)
 
 
 def _make(cell: Cell, folder: Path, report: Report) -> None:
-    """Unless it is made, or another process makes it."""
+    """Run a cell unless it is done, or another process runs it."""
     if (folder / EPISODES).exists():
         return
     folder.mkdir(parents=True, exist_ok=True)
@@ -65,7 +65,7 @@ def _make(cell: Cell, folder: Path, report: Report) -> None:
 
 
 def _write(chosen: list[Cell], output: Path, report: Report) -> None:
-    """The page, if all trainings are there."""
+    """Write the page if all trainings exist."""
     missing = [cell for cell in chosen if not (cell.folder(output) / EPISODES).exists()]
     if missing:
         console.print(f"  {len(missing)} trainings are not done, here or by another process; run the command again")

@@ -15,7 +15,6 @@ from uuv_marl.atomic import write_text
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.benchmark import evaluate
-from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import Scenario, load_scenario
@@ -24,7 +23,7 @@ from uuv_marl.train.validation import shares_of
 CURVE, EPISODES, OTHERS = "curve.csv", "episodes.csv", "others"
 _TRAINERS = {"own": "research.learners.own", "sb3": "research.learners.sb3", "benchmarl": "research.learners.isac"}
 _TRAINED = 0.8
-"""Share of a cell's progress that the training is; assumed."""
+"""Share of the training in a cell's progress; assumed."""
 WEIGHTS_FOLDER = Path(__file__).resolve().parent / "policies"
 """Weights that ship, so that their rows can be run again."""
 
@@ -37,17 +36,17 @@ class Cell(NamedTuple):
     seed: int
 
     def folder(self, output: Path) -> Path:
-        """Where it lies."""
+        """Folder of the cell."""
         return output / "cells" / self.task.name / f"{self.learner.name}-{self.seed}"
 
     def policy(self, path: Path) -> str:
-        """The name of what it made, by the path of its weights."""
+        """Name of its policy, by the path of its weights."""
         path = path.resolve()
         return f"research.learners.squashed:Squashed,path={path}" if self.learner.trainer == "benchmarl" else str(path)
 
     @property
     def shipped_weights(self) -> Path:
-        """Where its weights ship, if they do."""
+        """Path of its shipped weights, which may not exist."""
         return WEIGHTS_FOLDER / f"{self.task.name}-{self.learner.name}-{self.seed}.safetensors"
 
 
@@ -68,7 +67,7 @@ def cells(tasks: list[str], learners: list[str], trainings: int) -> list[Cell]:
 
 
 def trainer_of(learner: Learner) -> Trainer:
-    """Its trainer, whose library is imported now."""
+    """Its trainer; imports the library."""
     learn: Trainer = import_module(_TRAINERS[learner.trainer]).learn
     return learn
 
@@ -80,9 +79,9 @@ def emptied(folder: Path) -> None:
 
 
 def make(cell: Cell, folder: Path, report: Report) -> None:
-    """Train it, and run its policy; what is there already stays."""
+    """Train a cell and run its policy; existing files are kept."""
     if not (folder / CURVE).exists():
-        emptied(folder)  # of a training that was cut off
+        emptied(folder)  # of an interrupted training
         spent: Report = lambda share: report(_TRAINED * share)  # noqa: E731
         asked = TrainingRequest(cell.task, cell.seed, folder, cell.learner.settings, AGENT_STEPS, MINUTES, spent)
         curve = trainer_of(cell.learner)(asked)
@@ -106,7 +105,6 @@ def episodes(policy: str, each: EvaluationSet, seeds: range) -> Iterator[Row]:
     rows = [
         {"set": each.name, "seed": str(run.seed), **measures(run.metrics, scenario)}
         for run in evaluate.episodes(scenario, policy, seeds)
-        if isinstance(run, Run)
     ]
     yield from sorted(rows, key=lambda row: int(row["seed"]))
 
@@ -117,7 +115,7 @@ MEASURES = (
 
 
 def measures(metrics: Metrics, scenario: Scenario) -> dict[str, str]:
-    """Headline, whole swarms, contacts of a vehicle, smallest distances [m], and time over l(t)'s or the way's [1]."""
+    """Headline, swarm success, collisions per vehicle, smallest distances [m], and time ratio [1], as texts."""
     share, whole = shares_of(metrics, scenario.task_class.headline)
     ratio = metrics["task"].get("time_ratio") if "task" in metrics else None
     if "task" not in metrics and metrics["task_time_s"] is not None:

@@ -16,7 +16,7 @@ from uuv_marl.types import Float64
 
 
 def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
-    """The headline on validation over agent-steps, mean and range of the trainings; the best controller as a line."""
+    """Headline on validation over agent-steps: mean and range of the trainings, and the best controller as a line."""
     figure, axes = panels(len(TASKS), 3, (3.6, 2.8))
     for ax, (name, task) in zip(axes, TASKS.items(), strict=False):
         for k, learner in enumerate(LEARNERS):
@@ -39,7 +39,7 @@ def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
 
 
 def draw_profiles(scores: Mapping[str, Float64], path: Path) -> Path:
-    """The share of trainings and tasks above a score, 1 being the best controller's, for each learner, with 95 % intervals."""
+    """Share of trainings and tasks above a score, where 1 is the best controller's, with 95 % intervals."""
     levels = np.linspace(0.0, 1.2, 61)
     figure, (ax, *_) = panels(1, 1, (5.0, 3.4))
     for k, (learner, (share, low, high)) in enumerate(profiles(scores, levels).items()):

@@ -22,8 +22,8 @@ from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.types import Float64
 
 _ENOUGH = 4
-"""Fewest trainings for a comparison: with three, a fifth of equal pairs differ significantly, with four or five a twelfth
-(3,000 simulated)."""
+"""Fewest trainings for a comparison. With three, a fifth of equal pairs differ significantly, with four or five a
+twelfth (3,000 simulated)."""
 _FEW = 100
 """Fewest episodes for a mean."""
 Groups = Mapping[tuple[str, ...], Sequence[Row]]
@@ -58,10 +58,11 @@ def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
     curves, rows = complete(curves, rows)
     groups, num_trainings = by_training(rows), len(grouped(curves, "task", "learner", "training"))
     wanted = len(TASKS) * len(LEARNERS) * TRAININGS
+    partial = f" so far (of {wanted})" * (num_trainings < wanted)
     return Template(read_text("learners", "story.md")).substitute(
         first=_first(groups), tiers=_tiers(groups), safety=_safety(groups), pairs=_pairs(groups), apart=_apart(groups),
         compute=_compute(curves), settings=_settings(), episodes=f"{len(rows):,}", steps=f"{AGENT_STEPS / 1e6:g}",
-        minutes=f"{MINUTES:g}", trainings=f"{num_trainings} trainings" + f" so far (of {wanted})" * (num_trainings < wanted),
+        minutes=f"{MINUTES:g}", trainings=f"{num_trainings} trainings" + partial,
     )  # fmt: skip
 
 

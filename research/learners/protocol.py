@@ -17,7 +17,7 @@ MINUTES: float = _DATA["minutes"]
 MEASURES: int = _DATA["measures"]
 TRIED_ON: list[str] = _DATA["tried_on"]
 SEA, SEA_LEVEL = "disturbed", 1
-"""Name of a set in the sea, and the level of the robustness axis ``X`` there."""
+"""Name of a set with disturbances, and its level of the robustness axis ``X``."""
 
 
 class EvaluationSet(NamedTuple):
@@ -37,9 +37,9 @@ class Task(NamedTuple):
     """That of the scenario."""
     num_vehicles: int
     policies: tuple[str, ...]
-    """Run beside the learners: the best law without a privilege, then others."""
+    """Run beside the learners: first the best controller without extra observations, then others."""
     tiers: tuple[tuple[EvaluationSet, ...], ...]
-    """Sets of unseen seeds; of unseen sizes and ranges; of unseen kinds of maps and the sea."""
+    """Sets of unseen seeds; of unseen sizes and ranges; of unseen kinds of maps and of disturbances."""
 
     @property
     def sets(self) -> tuple[EvaluationSet, ...]:

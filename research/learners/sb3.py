@@ -52,7 +52,8 @@ def learn(asked: TrainingRequest) -> list[Row]:
     env = VecNormalize(SwarmVecEnv(task.scenario, worlds, observe="closeness"), norm_obs=False)
     rate = float(settings.pop("learning_rate"))
     model = PPO(
-        "MlpPolicy", env, n_steps=STEPS, policy_kwargs={"net_arch": [64, 64], "log_std_init": settings.pop("log_std_init")},
+        "MlpPolicy", env, n_steps=STEPS,
+        policy_kwargs={"net_arch": [64, 64], "log_std_init": settings.pop("log_std_init")},
         learning_rate=lambda left: rate * max(left, 0.02), seed=TRAINING_SEEDS[0] + 1000 * asked.seed,
         device="cpu", **settings,
     )  # fmt: skip

@@ -27,8 +27,8 @@ def main(
 ) -> None:
     """Train a learner with each of its settings on two tasks, and write what came of it.
 
-    A trial's score is the mean over both tasks of its best validation: the mean of the headline and of the share of
-    whole swarms. OUTPUT/LEARNER.csv holds them all.
+    A trial's score is the mean over both tasks of its best validation: the mean of the headline and of swarm
+    success. OUTPUT/LEARNER.csv holds them all.
 
     Example: python -m research.learners.tune SB3-PPO
     """
@@ -54,7 +54,7 @@ def _trial(learner: str, k: int, settings: dict[str, object], folder: Path, repo
     scores: dict[str, str] = {}
     for name in TRIED_ON:
         (folder / name).mkdir(parents=True, exist_ok=True)
-        emptied(folder / name)  # of a trial that was cut off
+        emptied(folder / name)  # of an interrupted trial
         asked = TrainingRequest(TASKS[name], SEED, folder / name, settings, AGENT_STEPS // PART, MINUTES / PART, report)
         curve = trainer_of(LEARNERS[learner])(asked)
         scores[name] = f"{max((float(row['share']) + float(row['swarm_success'])) / 2.0 for row in curve):.4f}"

@@ -73,9 +73,10 @@ class Watch:
         return better
 
 
-def point(agent_steps: int, minutes: float, share: float, whole: float, contacts: float) -> Row:
-    """A row of a curve; the contacts are those of a vehicle."""
+def point(agent_steps: int, minutes: float, share: float, success: float, collisions: float) -> Row:
+    """A row of a curve; collisions are per vehicle."""
     return {
-        "agent_steps": str(agent_steps), "minutes": f"{minutes:.2f}", "share": f"{share:.4f}", "swarm_success": f"{whole:.4f}",
-        "collisions_per_vehicle": f"{contacts:.3f}",
+        "agent_steps": str(agent_steps), "minutes": f"{minutes:.2f}", "share": f"{share:.4f}",
+        "swarm_success": f"{success:.4f}",
+        "collisions_per_vehicle": f"{collisions:.3f}",
     }  # fmt: skip

@@ -28,15 +28,7 @@ def _cases(
     parameters: Mapping[str, object] = NOTHING,
     scenarios: Iterable[str] = _ALL,
 ) -> dict[str, Case]:
-    """A case for each scenario to which another reading of the paper applies.
-
-    Args:
-        name: of the assumption.
-        label: of the other reading.
-        overrides: fields of the scenario that it changes.
-        parameters: of the policy that it changes.
-        scenarios: names of those to which it applies.
-    """
+    """A case for each scenario to which another reading of the paper applies."""
     return {s: Case(f"{name} {label} {s}", s, overrides=overrides, parameters=parameters) for s in scenarios}
 
 

@@ -8,8 +8,9 @@ from matplotlib.axes import Axes
 
 from research.columns import Columns
 from research.paper.measures import corner_times
+from uuv_marl.benchmark.results import Trace
 from uuv_marl.benchmark.style import BLACK, BLUE, GREY, ORANGE, draw_map
-from uuv_marl.benchmark.suite import Case, Suite, Trace
+from uuv_marl.benchmark.suite import Case, Suite
 from uuv_marl.types import Int64
 
 GROUPS = ((0, BLUE, "starts to port"), (1, ORANGE, "starts to starboard"))
@@ -40,14 +41,7 @@ def mark_corners(ax: Axes, case: Case) -> None:
 
 
 def draw_routes(ax: Axes, table: Columns, case: Case, title: str = "") -> None:
-    """Routes by the group of the start, with start and end of every vehicle, and the centre's place in time.
-
-    Args:
-        ax: where to draw.
-        table: as ``route_table`` makes it.
-        case: gives the trajectory and the obstacles.
-        title: stands above; none by default.
-    """
+    """Routes by the group of the start, with start and end of every vehicle, and the centre's place in time."""
     vehicles = len(np.unique(table["vehicle"]))
     x, y, group, time = (table[name].reshape(vehicles, -1).T for name in ("x_m", "y_m", "group", "time_s"))
     for side, colour, label in GROUPS:

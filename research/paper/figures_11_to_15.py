@@ -57,14 +57,7 @@ def draw_11(computed: Tables) -> Figure:
 
 
 def figure_12_or_13(name: str, symbol: str, small: Case, large: Case) -> Part:
-    """Routes with one obstacle gain too small and too large.
-
-    Args:
-        name: of the part.
-        symbol: of the gain, a field of ``BioInspiredGains``.
-        small: the case in which it is too small.
-        large: the case in which it is too large.
-    """
+    """Routes with one obstacle gain too small and too large."""
 
     def gain(case: Case) -> float:
         return float(getattr(case.parameters.get("gains", BioInspiredGains()), symbol))
@@ -81,14 +74,7 @@ def figure_12_or_13(name: str, symbol: str, small: Case, large: Case) -> Part:
 
 
 def part(name: str, cases: tuple[Case, ...], tables: Mapping[str, Made], draw: Callable[[Tables], Figure]) -> Part:
-    """A part whose tables are each a function of one case.
-
-    Args:
-        name: of the part.
-        cases: what must have been run.
-        tables: of each table's name, how it is made and of which case.
-        draw: makes the picture of the tables.
-    """
+    """A part whose tables are each a function of one case."""
 
     def compute(suite: Suite, _report: Share) -> Tables:
         return {key: make(suite, case) for key, (make, case) in tables.items()}

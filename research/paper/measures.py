@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from uuv_marl.benchmark.suite import Trace
+from uuv_marl.benchmark.results import Trace
 from uuv_marl.types import Float32, Float64, Int64
 
 SPEED_MPS = 4.0
@@ -23,14 +23,7 @@ LINK_M = 20.0
 
 
 def between(trace: Trace, name: str, start: float, end: float) -> Float32:
-    """A series, or routes, in a window of time, both ends included; the first axis is time.
-
-    Args:
-        trace: of a run.
-        name: of the array.
-        start: of the window [s].
-        end: of the window [s].
-    """
+    """A series, or routes, in a window of time, both ends included; the first axis is time."""
     time = trace["route_time_s" if name.startswith("route_") else "time_s"]
     return trace[name][(time >= start) & (time <= end)]
 
@@ -131,8 +124,8 @@ def spacing_change_at_corners(trace: Trace) -> float:
 def extent_before(trace: Trace) -> float:
     """Largest spacing [m] when the swarm has gathered, 10 s before its first vehicle detects an obstacle at 100 m."""
     nearest = trace["obstacle_distance_m"].min(axis=1)
-    heard = trace["time_s"][np.argmax(nearest < 100.0)]
-    return float(between(trace, "max_spacing_m", heard - 10.0, heard).mean())
+    detected = trace["time_s"][np.argmax(nearest < 100.0)]
+    return float(between(trace, "max_spacing_m", detected - 10.0, detected).mean())
 
 
 def dispersal(trace: Trace) -> float:

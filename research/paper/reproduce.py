@@ -73,14 +73,7 @@ def reproduce(folder: Path, seeds: int, only: Sequence[str], report: Report) -> 
 
 
 def make(part: Part, suite: Suite, folder: Path, report: Share) -> Path:
-    """A part's data and picture; the picture is drawn from the data as they are on disk.
-
-    Args:
-        part: what to make.
-        suite: holds its runs, and makes those that are missing.
-        folder: of the reproduction; the data and the picture go below it.
-        report: is called with the share of the work that is done.
-    """
+    """A part's data and picture; the picture is drawn from the data as they are on disk."""
     stamp, code = folder / "runs" / f"{part.name}.json", _code()
     reusable: dict[str, Any] = json.loads(stamp.read_text(encoding="utf-8")) if stamp.exists() else {}
     paths = [folder / "data" / f"{name}.csv" for name in reusable.get("tables", ())]
@@ -90,7 +83,7 @@ def make(part: Part, suite: Suite, folder: Path, report: Share) -> Path:
         paths = [folder / "data" / f"{name}.csv" for name in tables]
         for path, table in zip(paths, tables.values(), strict=True):
             write_columns(path, table)
-        if not part.cases:  # tables made of runs are cheap once these are there
+        if not part.cases:  # tables from existing runs are cheap
             stamp.parent.mkdir(parents=True, exist_ok=True)
             write_text(stamp, json.dumps({"code": code, "tables": list(tables)}))
     return draw(part, {path.stem: read_columns(path) for path in paths}, folder / "figures" / f"{part.name}.png")

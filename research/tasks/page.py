@@ -35,12 +35,7 @@ _MEASURES: Mapping[str, tuple[str, Callable[[Sequence[float], int], str]]] = {
 
 
 def report(task: str, rows: Sequence[Row]) -> str:
-    """The page's text.
-
-    Args:
-        task: a name of ``STUDIES``.
-        rows: episodes, as ``TASK.csv.gz`` holds them.
-    """
+    """The page's text."""
     groups = grouped(rows, "policy", "set")
     study = STUDIES[task]
     kinds = {name.split("-")[1]: [name] for name in study.own if "-" in name}

@@ -15,7 +15,7 @@ from uuv_marl.baselines.learned.checkpoint import is_checkpoint
 from uuv_marl.baselines.names import parse_name
 from uuv_marl.benchmark.evaluate import Run, blaming, episodes
 from uuv_marl.benchmark.results import FILE
-from uuv_marl.errors import MENDABLE, DivergenceError, PolicyError, ResultsError
+from uuv_marl.errors import USER_ERRORS, DivergenceError, PolicyError, ResultsError
 
 _HOME = "heldout.csv.gz"
 
@@ -44,9 +44,6 @@ class Verdict(NamedTuple):
 
 def find(paths: Sequence[Path]) -> tuple[list[Row], list[Path]]:
     """All rows of these files and of the files in these folders; and the folders' tables that hold no episodes.
-
-    Args:
-        paths: files and folders; empty for the documents of the checkout.
 
     Raises:
         ResultsError: there are no episodes, or a file is broken.
@@ -95,7 +92,7 @@ def policy_of(row: Row) -> str:
 
 
 def fresh_seed() -> int:
-    """A seed that nobody chose."""
+    """A random seed."""
     return secrets.randbelow(1_000_000)
 
 
@@ -106,19 +103,13 @@ def draw(rows: Sequence[Row], sample: int, seed: int) -> list[Row]:
 
 
 def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -> Verdict:
-    """Run a row's episode again and compare it.
-
-    Args:
-        row: to check.
-        allowed: policies that are no names of the package but may be opened or imported, because the reader named them.
-        report: called with the share of the episode that is done.
-    """
+    """Run a row's episode again and compare it."""
     try:
         _check_trust(policy_of(row), allowed)
         run = _rerun(row, report)
     except DivergenceError as error:
         return Verdict(row, [Difference("episode", "ended", f"diverged: {error}")])
-    except (*MENDABLE, ModuleNotFoundError) as error:
+    except (*USER_ERRORS, ModuleNotFoundError) as error:
         return Verdict(row, reason=str(error))
     now = dict(zip(row.kind.measured, row.kind.written(row.cells, run.metrics), strict=True))
     return Verdict(row, [Difference(f, row.cells[f], now[f]) for f in row.kind.measured if row.cells[f] != now[f]])
@@ -134,12 +125,10 @@ def _rerun(row: Row, report: Callable[[float], None]) -> Run:
     if not row.cells["seed"].isdecimal():
         raise ResultsError(f"seed must be a whole number, got {row.cells['seed']!r}")
     source, seed = row.kind.source(row.cells), int(row.cells["seed"])
+    scenario = with_policy_requirements(source.policy, source.scenario)
     with blaming(source.policy):
-        for event in episodes(with_policy_requirements(source.policy, source.scenario), source.policy, [seed], None):
-            if isinstance(event, Run):
-                return event
-            report(event.share)
-    raise AssertionError("an episode ends in a run or in an error")
+        (run,) = episodes(scenario, source.policy, [seed], None, report)
+    return run
 
 
 def failed(verdicts: Sequence[Verdict]) -> bool:
@@ -153,12 +142,7 @@ def _upper_bound(count: int, rows: int) -> float:
 
 
 def summary(verdicts: Sequence[Verdict], rows: int) -> str:
-    """How many agree, and what that says of all rows.
-
-    Args:
-        verdicts: of the rows that were drawn.
-        rows: how many there are to draw from.
-    """
+    """How many agree, and what that says of all rows."""
     run = [verdict for verdict in verdicts if not verdict.reason]
     if not verdicts:
         return "No row was run."

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from research.episodes import Row as Cells
-from research.episodes import cells as told
+from research.episodes import cells as cells_of
 from research.episodes import read_text
 from research.heldout import sets as heldout
 from research.learners import cells as learners
@@ -37,7 +37,7 @@ class Source(NamedTuple):
     """What a row is made of, beside its seed."""
 
     scenario: Scenario
-    """The scenario before it grants what the policy declares."""
+    """The scenario without the policy's requirements."""
     policy: str
 
 
@@ -92,12 +92,12 @@ def rows_of(file: Path) -> list[Row]:
     kind = _kind(head)
     if kind is None:
         raise NoEpisodesError(
-            f"{file} is no file of episodes, its columns are {', '.join(head) or 'missing'}; give a .csv.gz of docs, "
+            f"{file} holds no episodes: its columns are {', '.join(head) or 'missing'}; give a .csv.gz of docs, "
             f"an episodes.csv of uuv-marl robustness or a benchmark's {FILE}"
         )
     for number, line in lines[1:]:
         if len(line) != len(head):
-            raise ResultsError(f"{file}:{number} has {len(line)} cells under {len(head)} columns; mend or remove it")
+            raise ResultsError(f"{file}:{number} has {len(line)} cells under {len(head)} columns; correct or remove it")
     return [Row(file, number, kind, dict(zip(head, line, strict=True))) for number, line in lines[1:]]
 
 
@@ -119,7 +119,7 @@ def _kind(head: Sequence[str]) -> Kind | None:
 
 
 def _written(measured: Sequence[str], digits: str, _: Cells, metrics: Metrics) -> Sequence[str]:
-    return list(told(metrics, measured, digits).values())
+    return list(cells_of(metrics, measured, digits).values())
 
 
 def _of(case: Case) -> Source:

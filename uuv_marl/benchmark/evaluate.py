@@ -52,22 +52,16 @@ class Run(NamedTuple):
     """Corners of the reference trajectory [m], shape (point, 2)."""
 
 
-class Progress(NamedTuple):
-    """The progress of an evaluation."""
-
-    share: float
-    """Share of the largest possible simulated time of all seeds."""
-
-
 Watch = Callable[[Swarm, Float32 | None], None]
 """Called with the swarm after its reset and after every step, and with the preceding actions (world, vehicle, 2), None
 after the reset. It must not change the arrays, and must copy those that it keeps."""
 
 
 def episodes(
-    scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch | None = None, /, **parameters: object
-) -> Iterator[Run | Progress]:
-    """Run a policy on a scenario; yields each episode as soon as it ends, with progress in between.
+    scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch | None = None,
+    report: Callable[[float], object] | None = None, /, **parameters: object,
+) -> Iterator[Run]:  # fmt: skip
+    """Run a policy on a scenario; yields each episode as soon as it ends.
 
     A run depends on its seed alone, not on the other seeds.
 
@@ -76,6 +70,7 @@ def episodes(
         policy: the policy's name, see ``uuv_marl.baselines.make_policy``.
         seeds: one seed for each episode.
         watch: called after the reset and after every step.
+        report: called with the finished share of the largest possible simulated time of all seeds.
         parameters: keyword arguments of the policy.
 
     Raises:
@@ -85,11 +80,12 @@ def episodes(
     seeds = [whole_number("seed", seed, 0) for seed in seeds]
     for first in range(0, len(seeds), BATCH):
         batch = seeds[first : first + BATCH]
-        for event in _batch(scenario, policy, batch, watch or _look_away, parameters):
-            if isinstance(event, Progress):
-                yield Progress((first + event.share * len(batch)) / len(seeds))
-            else:
-                yield event
+
+        def note(share: float, first: int = first, size: int = len(batch)) -> None:
+            if report:
+                report((first + share * size) / len(seeds))
+
+        yield from _batch(scenario, policy, batch, watch, note, parameters)
 
 
 def evaluate(
@@ -115,7 +111,7 @@ def evaluate(
     """
     given = [*seeds]
     with blaming(policy):
-        runs = [run for run in episodes(changed(scenario, policy, **changes), policy, given) if isinstance(run, Run)]
+        runs = [*episodes(changed(scenario, policy, **changes), policy, given)]
     return [{"seed": run.seed, **run.metrics} for run in sorted(runs, key=lambda run: given.index(run.seed))]
 
 
@@ -130,13 +126,10 @@ def blaming(policy: str) -> Generator[None]:
         raise PolicyError(f"policy {policy!r}: {error}") from error
 
 
-def _look_away(swarm: Swarm, action: Float32 | None) -> None:
-    pass
-
-
 def _batch(
-    scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch, parameters: dict[str, object]
-) -> Iterator[Run | Progress]:
+    scenario: Scenario, policy: str, seeds: Sequence[int], watch: Watch | None, report: Callable[[float], object],
+    parameters: dict[str, object],
+) -> Iterator[Run]:  # fmt: skip
     """Episodes of seeds that are stepped together."""
     swarm = Swarm(scenario, len(seeds))
     actor = make_policy(policy, scenario, len(seeds), **parameters)
@@ -149,14 +142,16 @@ def _batch(
     steps, step = math.ceil(limits.max() / period) + 1, 0
     every = max(round(ROUTE_PERIOD_S / period), math.ceil(steps * swarm.num_vehicles / MOST_SAMPLES), 1)
     samples = [_sample(swarm)]
-    watch(swarm, None)
+    if watch:
+        watch(swarm, None)
     diverged: list[str] = []
     report_every = max(1, round(2.0 / period))
     while active.any():
         action = actor.act(percept)
         percept = swarm.step(action, active)
         recorder.update(active)
-        watch(swarm, action)
+        if watch:
+            watch(swarm, action)
         step += 1
         ended = active & swarm.ended
         for w in (int(index) for index in np.flatnonzero(ended)):
@@ -176,9 +171,8 @@ def _batch(
         actor.active[:] = active
         if step % every == 0:
             samples.append(_sample(swarm))
-        if step % report_every == 0:
-            done = np.where(active, swarm.facts.time_s, limits)
-            yield Progress(float(done.sum() / limits.sum()))
+        if step % report_every == 0 or ended.any():
+            report(float(np.where(active, swarm.facts.time_s, limits).sum() / limits.sum()))
     if diverged:
         raise DivergenceError("; ".join(diverged))
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from uuv_marl.benchmark.results import Results
+from uuv_marl.benchmark.results import Results, Trace
 from uuv_marl.benchmark.style import BLACK, BLUE, GREEN, ORANGE, PINK, draw_map, house_style, legend, panels, save
 from uuv_marl.extras import pictures
 from uuv_marl.scenario import Scenario, conditions, disturbances
@@ -23,7 +23,6 @@ with pictures():
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
-Trace = dict[str, Float32]
 _TEAMS = (BLUE, GREEN, PINK, BLACK)
 _GRID_S = 0.5
 _ROUTE_S = 2.0

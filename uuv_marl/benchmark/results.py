@@ -34,6 +34,8 @@ from uuv_marl.scenario.messages import explain
 from uuv_marl.types import Float32
 
 FILE = "results.json"
+Trace = dict[str, Float32]
+"""Time series of a run by name, see ``load_trace``."""
 _PACKAGE = Path(__file__).resolve().parent.parent
 _SOURCES = (
     "*.py", "scenario/**/*.py", "sim/**/*.py", "tasks/**/*.py", "baselines/**/*.py", "baselines/tuned/*.json",
@@ -221,7 +223,7 @@ class Results:
         """Path of a run's time series."""
         return trace_path(self.folder, scenario, policy, seed)
 
-    def trace(self, scenario: str, policy: str, seed: int) -> dict[str, Float32]:
+    def trace(self, scenario: str, policy: str, seed: int) -> Trace:
         """A run's time series, see ``load_trace``."""
         return load_trace(self.trace_path(scenario, policy, seed))
 
@@ -239,7 +241,7 @@ def run_name(scenario: str, policy: str, seed: int) -> str:
     return name
 
 
-def load_trace(path: UserPath) -> dict[str, Float32]:
+def load_trace(path: UserPath) -> Trace:
     """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
 
     Also ``obstacles`` and ``waypoints``, and where trajectories are kept the fields of ``evaluate.Routes`` as

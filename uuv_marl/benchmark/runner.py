@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import product
 from pathlib import Path
 
 from uuv_marl.atomic import write_text, writing
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.names import OWN_CLOCK, with_option
 from uuv_marl.baselines.registry import is_trained
-from uuv_marl.benchmark.evaluate import Progress, Run, blaming, episodes
+from uuv_marl.benchmark.evaluate import blaming, episodes
 from uuv_marl.benchmark.figures import draw_all
 from uuv_marl.benchmark.results import ResultRow, Results
 from uuv_marl.benchmark.tables import Table, markdown_table, scenario_table
@@ -44,20 +45,19 @@ def run_missing(
 
     ``parameters`` are keyword arguments of the policies.
     """
-    for scenario in scenarios:
-        for policy in policies:
-            results.use(policy)
-            missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
-            done, fresh, share = len(seeds) - len(missing), 0, 0.0
-            report(scenario.name, policy, done / len(seeds))
-            with blaming(policy):
-                for event in episodes(with_policy_requirements(policy, scenario), policy, missing, **parameters):
-                    if isinstance(event, Run):
-                        results.add(scenario.name, policy, event)
-                        fresh += 1
-                    share = max(share, event.share if isinstance(event, Progress) else fresh / len(missing))
-                    report(scenario.name, policy, (done + len(missing) * share) / len(seeds))
-            report(scenario.name, policy, 1.0)
+    for scenario, policy in product(scenarios, policies):
+        results.use(policy)
+        missing = [seed for seed in seeds if not results.has(scenario.name, policy, seed)]
+
+        def note(share: float, pair: tuple[str, str] = (scenario.name, policy), left: int = len(missing)) -> None:
+            report(*pair, 1.0 - left / len(seeds) * (1.0 - share))
+
+        note(0.0)
+        with blaming(policy):
+            loaded = with_policy_requirements(policy, scenario)
+            for run in episodes(loaded, policy, missing, None, note, **parameters):
+                results.add(scenario.name, policy, run)
+        note(1.0)
 
 
 def distinct_names(scenarios: Sequence[Scenario], what: str) -> list[str]:

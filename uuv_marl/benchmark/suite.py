@@ -9,12 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.benchmark.results import Results
+from uuv_marl.benchmark.results import Results, Trace
 from uuv_marl.benchmark.runner import run_missing
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.types import Float32
 
-Trace = dict[str, Float32]
 Report = Callable[[str, float], None]
 """Called with the current task, and the share of the work that is done."""
 NOTHING: Mapping[str, object] = MappingProxyType({})

@@ -15,7 +15,8 @@ from uuv_marl.benchmark.results import PolicyInfo, ResultRow, Results, requireme
 from uuv_marl.scenario import Scenario, conditions, differences, scenario_names
 from uuv_marl.tasks import Follow
 
-_NOTHING = "–"
+NOTHING = "–"
+"""Cell without a value."""
 _NARROW = 110
 """Columns of a terminal below which its table omits intervals and the time mean."""
 HEADERS = (
@@ -107,15 +108,15 @@ def _cells(scenario: Scenario, runs: Sequence[ResultRow], info: PolicyInfo) -> C
         requirements=_requirements_text(scenario, policy, info),
         arrived=f"{len(times)}/{len(runs)}",
         time=estimate_text(times, ".1f"),
-        slowest=f"{max(times):.1f}" if times else _NOTHING,
+        slowest=f"{max(times):.1f}" if times else NOTHING,
         distance=estimate_text(distances, ".2f"),
-        nearest=f"{min(distances):.2f}" if distances else _NOTHING,
+        nearest=f"{min(distances):.2f}" if distances else NOTHING,
         spacing=estimate_text(spacings, ".2f"),
-        closest=f"{min(spacings):.2f}" if spacings else _NOTHING,
+        closest=f"{min(spacings):.2f}" if spacings else NOTHING,
         mean=estimate_text(_measured(runs, "mean_min_spacing_m"), ".2f"),
         within=", ".join(f"{name} {np.mean([s[name] for s in shares]):.0%}" for name in ("s_l", "s_o", "s_u")),
         collisions=f"{sum(collisions)} in {counted(collided, 'seed')}" if collided else "0",
-        paper=_NOTHING if differences(scenario) else _paper_cell(PAPER.get((scenario.name, policy), PaperFigure())),
+        paper=NOTHING if differences(scenario) else _paper_cell(PAPER.get((scenario.name, policy), PaperFigure())),
     )
 
 
@@ -124,7 +125,7 @@ def _task_cells(cells: Cells, runs: Sequence[ResultRow], columns: Iterable[str])
     shares = _measured(runs, "success_share")
     return (
         cells.policy, cells.requirements, f"{_measured(runs, 'swarm_success').count(1.0)}/{len(runs)}",
-        f"{np.mean(shares):.1%}" if shares else _NOTHING,
+        f"{np.mean(shares):.1%}" if shares else NOTHING,
         *(estimate_text(_measured(runs, name), ".3g") for name in columns),
         cells.distance, cells.nearest, cells.spacing, cells.closest, cells.collisions,
     )  # fmt: skip
@@ -138,7 +139,7 @@ def _measured(runs: Sequence[ResultRow], name: str) -> list[float]:
 
 def estimate_text(sample: Sequence[float], spec: str) -> str:
     """An estimate as text, each number as ``spec`` says: without interval for few values, a dash for none."""
-    return f"{estimate(sample, fewest=FEWEST):{spec}}" if sample else _NOTHING
+    return f"{estimate(sample, fewest=FEWEST):{spec}}" if sample else NOTHING
 
 
 def counted(number: int, what: str) -> str:
@@ -156,7 +157,7 @@ def _requirements_text(scenario: Scenario, policy: str, info: PolicyInfo) -> str
     damping = required.actuators.yaw_damping_nms
     if damping and (parse_name(policy).own_clock or not scenario.timing.fixed):
         texts.append(f"yaw damping {damping:g} N m s")
-    return ", ".join(texts) or _NOTHING
+    return ", ".join(texts) or NOTHING
 
 
 def _paper_cell(paper: PaperFigure) -> str:
@@ -166,7 +167,7 @@ def _paper_cell(paper: PaperFigure) -> str:
         f"{distances} m" if distances else "",
         f"spacing {paper.min_spacing_m:g} m, mean {paper.mean_min_spacing_m:g} m" if paper.min_spacing_m else "",
     )
-    return ", ".join(filter(None, parts)) or _NOTHING
+    return ", ".join(filter(None, parts)) or NOTHING
 
 
 def terminal_table(table: Table, width: int) -> RichTable:
@@ -189,7 +190,7 @@ def terminal_table(table: Table, width: int) -> RichTable:
             out.add_column(escape(header), overflow="fold", width=widths.get(header))
     for row in table.rows:
         cells = _stacked(Cells(*row), narrow) if stacked else row
-        out.add_row(*(escape(cell.replace(_NOTHING, "-")) for cell in cells))  # a dash that every terminal has
+        out.add_row(*(escape(cell.replace(NOTHING, "-")) for cell in cells))  # a dash that every terminal has
     return out
 
 
@@ -197,7 +198,7 @@ def _stacked(c: Cells, narrow: bool) -> tuple[str, ...]:
     """The cells of a row that fit a terminal; a narrow one omits intervals, the time mean and the shares of Eq. 7."""
     time, distance, spacing = (text.partition(" [")[0] if narrow else text for text in (c.time, c.distance, c.spacing))
     return (
-        c.policy if c.requirements == _NOTHING else f"{c.policy}\n({c.requirements})",
+        c.policy if c.requirements == NOTHING else f"{c.policy}\n({c.requirements})",
         c.arrived,
         f"{time}\nworst {c.slowest}",
         f"{distance}\nworst {c.nearest}",

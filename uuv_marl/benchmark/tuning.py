@@ -195,7 +195,7 @@ def tune(policy: str, output: UserPath, trials: int, report: Callable[[int, floa
 
     def objective(trial: optuna.Trial) -> float:
         drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.free.items()}
-        runs = [run for run in episodes(scenario, policy, seeds, **space.parameters(drawn)) if isinstance(run, Run)]
+        runs = [*episodes(scenario, policy, seeds, **space.parameters(drawn))]
         return sum(tuning_cost(run, scenario) for run in runs) / len(runs)
 
     def sampler(seed: int) -> optuna.samplers.BaseSampler:

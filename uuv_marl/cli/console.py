@@ -17,7 +17,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from uuv_marl.atomic import locked
-from uuv_marl.errors import MENDABLE, PolicyError
+from uuv_marl.errors import USER_ERRORS, PolicyError
 from uuv_marl.extras import extra as extra  # noqa: PLC0414 - commands take all that they share from here
 from uuv_marl.paths import user_path
 
@@ -87,7 +87,7 @@ def explained(*ours: str) -> Iterator[None]:
         raise
     except Exception as error:
         frames = _own_frames(error, ours) or _own_frames(error.__cause__, ours)
-        if isinstance(error, MENDABLE):
+        if isinstance(error, USER_ERRORS):
             message = str(error)
         elif frames:
             message = f"{type(error).__name__}: {error}"

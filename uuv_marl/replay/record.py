@@ -25,7 +25,7 @@ def record(
     policy: str,
     seed: int,
     inspect: Iterable[int] = (),
-    report: Callable[[float], None] | None = None,
+    report: Callable[[float], object] | None = None,
 ) -> Recording:
     """Run an episode as the benchmark does, and record all vehicles at every decision.
 
@@ -45,12 +45,8 @@ def record(
     scenario = with_policy_requirements(policy, scenario)
     tape = _Tape(watched)
     with blaming(policy):
-        for event in episodes(scenario, policy, [seed], tape):
-            if isinstance(event, Run):
-                return tape.recording(scenario, policy, event)
-            if report:
-                report(event.share)
-    raise AssertionError("an episode ends with a run or an error")
+        (run,) = episodes(scenario, policy, [seed], tape, report)
+    return tape.recording(scenario, policy, run)
 
 
 def checked(inspect: Iterable[int], scenario: Scenario) -> list[int]:

@@ -15,7 +15,7 @@ class Event(NamedTuple):
 
     time_s: float
     kind: str
-    """``collision`` of two vehicles, ``obstacle`` for one with an obstacle, ``near`` and ``near_obstacle`` where spacing
+    """``collision`` of two vehicles, ``obstacle`` with an obstacle, ``near`` and ``near_obstacle`` where spacing
     falls below s_u or clearance below s_o, ``lost``, or ``arrived`` for the swarm."""
     vehicles: tuple[int, ...]
     """Indices of the vehicles; empty for the swarm, and where a saved trace does not name them."""

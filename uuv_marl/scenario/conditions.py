@@ -86,6 +86,5 @@ def _rest(scenario: Scenario) -> dict[str, bool]:
 
 
 def _fault_phrase(fault: Fault) -> str:
-    """A fault and its remaining efficiency."""
     left = f" to {fault.efficiency:.3g}" if fault.efficiency > 0.0 else ""
     return f"{fault.kind if fault.array is None else f'{fault.array} array'} fault{left}"

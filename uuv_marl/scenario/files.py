@@ -16,7 +16,7 @@ from uuv_marl.scenario.fields import NAME
 from uuv_marl.scenario.messages import explain, shown
 from uuv_marl.scenario.overrides import assign, leaves, plain
 from uuv_marl.scenario.scenario import Scenario
-from uuv_marl.scenario.vehicle_files import left_out, load_vehicle, variant_comments, vehicle_file
+from uuv_marl.scenario.vehicle_files import load_vehicle, optional_defaults, variant_comments, vehicle_file
 
 _FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
@@ -64,9 +64,9 @@ def load_scenario(
         ordered = sorted((overrides or {}).items(), key=lambda one: (str(one[0]) != "vehicle", str(one[0]).count(".")))
         for field, value in ((str(field), plain(value)) for field, value in ordered):
             if field == "vehicle" and isinstance(value, str):
-                data = _of_vehicle(merged(data, load_vehicle(value)), data)
+                data = _without_foreign_loop(merged(data, load_vehicle(value)), data)
                 continue
-            if field == "vehicle" and (below := left_out(value)):
+            if field == "vehicle" and (below := optional_defaults(value)):
                 data["vehicle"] = below
             assign(data, field, value)
         if num_vehicles is not None:
@@ -100,7 +100,7 @@ def show(name: UserPath) -> str:
     document = tomlkit.parse(to_toml(load_scenario(name)))
     sources: dict[str, str] = {}
     for file in _layers(_find(name)):
-        if left_out(file.data.get("vehicle")) is not None:
+        if optional_defaults(file.data.get("vehicle")) is not None:
             sources = {field: source for field, source in sources.items() if not field.startswith("vehicle.")}
         own = "" if file.path.is_relative_to(_FOLDER) else f"# {file.path.name}"
         sources |= {field: item.trivia.comment or own for field, item in items(tomlkit.parse(file.text))}
@@ -168,15 +168,15 @@ def _data(scenario: Any) -> dict[str, Any]:
         )
     data: dict[str, Any] = {}
     for file in _layers(path):
-        before, below = data, left_out(file.data.get("vehicle"))
+        before, below = data, optional_defaults(file.data.get("vehicle"))
         if below is not None:
             data = {**data, "vehicle": below}
-        data = _of_vehicle(merged(data, file.data), before)
+        data = _without_foreign_loop(merged(data, file.data), before)
     data.pop("extends", None)
     return {**data, "name": path.stem}
 
 
-def _of_vehicle(data: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
+def _without_foreign_loop(data: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
     """The data; a fixed inner loop is set to 0 if the vehicle differs from ``before``."""
     names = [each.get("vehicle", {}).get("name") for each in (before, data)]
     if data.get("timing", {}).get("fixed") and None not in names and names[0] != names[1]:

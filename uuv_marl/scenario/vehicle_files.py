@@ -20,9 +20,8 @@ _OPTIONAL: dict[str, dict[str, Any]] = {
     section: {name: field.default for name, field in model.model_fields.items() if not field.is_required()}
     for section, model in (("vehicle", Vehicle), ("actuators", Actuators))
 }
-"""Defaults of the fields that a vehicle's file may omit, independent of the previous vehicle."""
 _OPTIONAL["actuators"] |= {"thrust_lag_s": 0.0, "yaw_lag_s": 0.0}
-"""What a vehicle's file may leave out, and what it is then, whatever vehicle there was before."""
+"""Defaults of the fields that a vehicle's file may omit, independent of the previous vehicle."""
 
 
 def vehicle_names() -> list[str]:
@@ -83,7 +82,7 @@ def vehicle_file(name: str, beside: Path | None = None) -> File:
     return file._replace(data=data, variants=chosen)
 
 
-def left_out(vehicle: object) -> dict[str, Any] | None:
+def optional_defaults(vehicle: object) -> dict[str, Any] | None:
     """Defaults of a complete vehicle's omitted fields; None for a table with only some numbers of a vehicle."""
     needed = _FIELDS_BY_SECTION["vehicle"] - _OPTIONAL["vehicle"].keys()
     whole = isinstance(vehicle, dict) and needed <= cast(dict[str, Any], vehicle).keys()

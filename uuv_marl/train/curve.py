@@ -17,13 +17,7 @@ _SHOWN = {
 
 
 def draw_curve(rows: Sequence[Sequence[str]], path: Path, title: str) -> None:
-    """Draw validations and reward over processor time.
-
-    Args:
-        rows: rows of ``progress.csv``.
-        path: file of the picture.
-        title: text above the picture.
-    """
+    """Draw validations and reward over processor time."""
     with house_style():
         figure, axes = panels(len(_SHOWN), 3, (4.2, 3.2))
         for ax, (what, columns) in zip(axes, _SHOWN.items(), strict=True):

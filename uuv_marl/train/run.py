@@ -124,12 +124,7 @@ def _due(record: Record, training: Training) -> int:
 
 
 class Trainer:
-    """A learner with its rows, and their checkpoints.
-
-    Args:
-        training: its description.
-        checkpoint: folder to restore; None to start.
-    """
+    """A learner with its rows, and their checkpoints."""
 
     def __init__(self, training: Training, checkpoint: Path | None = None) -> None:
         self.training, self._rng = training, np.random.default_rng(training.seed)

@@ -16,7 +16,7 @@ with extra("sb3", "training with Stable-Baselines3"):
 
 
 def save_sb3(model: PPO, path: UserPath) -> None:
-    """Write the actor of a model as a checkpoint, which ``make_policy`` and ``uuv-marl benchmark --policy`` run without torch.
+    """Write the actor of a model as a checkpoint, which ``make_policy`` and the benchmark run without torch.
 
     Args:
         model: PPO with ``MlpPolicy``, trained on ``SwarmVecEnv(..., observe="closeness")``.

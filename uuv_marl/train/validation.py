@@ -1,7 +1,6 @@
 """Validation of a policy: deterministic episodes on validation seeds, run by the benchmark."""
 
 import json
-import shlex
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -9,6 +8,7 @@ from typing import NamedTuple
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.replay.command import command
 from uuv_marl.scenario import load_scenario
 from uuv_marl.scenario.overrides import leaves
 from uuv_marl.train.rows import TRAINING_SEEDS
@@ -68,8 +68,7 @@ def validate(policy: str, training: Training) -> Validation:
 
 
 def _runs(policy: str, part: Part, seeds: Sequence[int]) -> Iterator[Run]:
-    scenario = with_policy_requirements(policy, part.scenario)
-    yield from (event for event in episodes(scenario, policy, seeds) if isinstance(event, Run))
+    return episodes(with_policy_requirements(policy, part.scenario), policy, seeds)
 
 
 def _end_s(run: Run) -> float:
@@ -95,7 +94,5 @@ def replay_command(policy: Path, training: Training, worst: Worst) -> str:
     changes = {**leaves(overrides_for(name, own)), "swarm.num_vehicles": n}
     if n == load_scenario(name).swarm.num_vehicles:
         del changes["swarm.num_vehicles"]
-    fields = {field: value for field, value in changes.items() if field not in _EVERY_POLICYS_OWN}
-    sets = [f" --set {shlex.quote(f'{field}={json.dumps(value)}')}" for field, value in fields.items()]
-    scenario, path = shlex.quote(name), shlex.quote(str(policy))
-    return f"uuv-marl replay --scenario {scenario} --policy {path} --seed {seed}{''.join(sets)}"
+    sets = [f"{field}={json.dumps(value)}" for field, value in changes.items() if field not in _EVERY_POLICYS_OWN]
+    return command(name, str(policy), seed, sets)

@@ -26,12 +26,8 @@ from uuv_marl.types import Bool, Float32, Float64
 class TangentBug(Filtered):
     """Towards the goal, or past the end of an obstacle; pushes among near neighbours, and the safety filter.
 
-    Made for goals at rest: the vector to the goal then gives a vehicle's position, up to its heading.
-
-    Args:
-        tuned_for: ``two_swarms``, or "" for hard water.
-        gains: replace the tuned ones.
-        barrier: margins and rates of the safety filter; replace the tuned ones.
+    Made for goals at rest: the vector to the goal then gives a vehicle's position, up to its heading. ``tuned_for`` is
+    ``two_swarms``, or "" for hard water; ``gains`` and ``barrier`` replace the tuned ones.
     """
 
     Memory: ClassVar[type[Any] | None] = WallsMemory
@@ -55,7 +51,7 @@ class TangentBug(Filtered):
         update_walls(flat, at, worlds, self.model.sectors, self._surroundings, self._walls)
         choose_directions(worlds, BugGains(*map(float, self.gains)), *self._view, self._surroundings, self._walls)
 
-    def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
+    def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it is in the memory
         """Actions of shape (world, vehicle, 2)."""
         action = np.zeros((*self._walls.num.shape, 2), np.float32)
         _decide_all(

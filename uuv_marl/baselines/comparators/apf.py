@@ -36,9 +36,7 @@ class ApfGains(NamedTuple):
 class Apf(Policy):
     """Artificial potential field: a well at l(t), hills at neighbours and obstacles, those weighted by l(t)'s distance.
 
-    Args:
-        tuned_for: ``two_swarms``, or "" for the paper's scenarios.
-        gains: replace the tuned ones.
+    ``tuned_for`` is ``two_swarms``, or "" for the paper's scenarios; ``gains`` replace the tuned ones.
     """
 
     requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
@@ -73,8 +71,8 @@ def apf_obstacle_force(
         return 0.0, 0.0, 0
     gap = 1.0 / near - 1.0 / g.obstacle_range
     away = g.obstacle * gap * (l_x * l_x + l_y * l_y) / (near * near)
-    homeward = g.obstacle * gap * gap
-    return homeward * l_x - away * n_x, homeward * l_y - away * n_y, int(rho < MIN_DISTANCE_M)
+    to_goal = g.obstacle * gap * gap
+    return to_goal * l_x - away * n_x, to_goal * l_y - away * n_y, int(rho < MIN_DISTANCE_M)
 
 
 @compiled

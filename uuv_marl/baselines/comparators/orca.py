@@ -39,9 +39,7 @@ class OrcaGains(NamedTuple):
 class OrcaInformed(Policy):
     """Reciprocal velocity obstacles: half-planes of velocity from neighbours' velocities and from echoes.
 
-    Args:
-        tuned_for: ``two_swarms``, or "" for the paper's scenarios.
-        gains: replace the tuned ones.
+    ``tuned_for`` is ``two_swarms``, or "" for the paper's scenarios; ``gains`` replace the tuned ones.
     """
 
     requirements = PolicyRequirements(("link",), yaw_damping_nms=600.0, outputs_force=True)

@@ -25,13 +25,8 @@ class Remembered(NamedTuple):
 class Actor(Policy):
     """A checkpoint's network without memory, from a vehicle's percept to its action. Deterministic.
 
-    Args:
-        name: the policy's name in messages.
-        checkpoint: the network and its card.
-        any_vehicle: whether it may run on a vehicle other than the training's.
-
-    Raises:
-        PolicyError: percept, decision period, inner loop or vehicle differ from the training's.
+    Raises PolicyError if percept, decision period or inner loop differ from the training's, or the vehicle, unless
+    ``any_vehicle``.
     """
 
     def __init__(
@@ -98,10 +93,7 @@ def in_disc(policy: Policy) -> bool:
 
 
 def check_same_training(policy: Policy, card: Card, any_vehicle: bool) -> None:
-    """Raise PolicyError if percept or vehicle of the policy's scenario differ from the training's.
-
-    ``any_vehicle``: whether the policy may run on a vehicle other than the training's.
-    """
+    """Raise PolicyError if the scenario's percept differs from the training's, or, unless any may, the vehicle."""
     scenario, name = policy.scenario, policy.name
     rows = card_rows(scenario)
     then, now = ({f"field {k}": row for k, row in enumerate(own)} for own in (card.percept, rows))

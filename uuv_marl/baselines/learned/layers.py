@@ -70,14 +70,7 @@ def shapes(architecture: Architecture, sizes: Sizes) -> dict[str, tuple[int, ...
 
 
 class Network:
-    """A network on rows of observations.
-
-    Args:
-        architecture: kind of input, memory and layers.
-        sizes: rows of an observation.
-        tensors: by name, as in ``shapes``.
-        ops: operations on these tensors, see ``NumpyOps``.
-    """
+    """A network of ``tensors`` (see ``shapes``) on rows of observations, with operations such as ``NumpyOps``."""
 
     def __init__(self, architecture: Architecture, sizes: Sizes, tensors: Mapping[str, Any], ops: Any) -> None:
         self.architecture, self._tensors, self._ops = architecture, tensors, ops

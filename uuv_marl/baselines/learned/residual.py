@@ -17,12 +17,7 @@ SHARE = 0.5  # largest part of the full force that a network adds to the base co
 
 
 class ResidualPolicy(Policy):
-    """Actions of a base controller plus those of another policy.
-
-    Args:
-        base: the base controller, whose channels and inner loop the other policy has too.
-        inner: the other policy, made for the same scenario and worlds.
-    """
+    """Actions of a base controller plus those of an inner policy, made for the same scenario and worlds."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, base: Policy, inner: Policy) -> None:
         self.base, self.inner = base, inner

@@ -12,10 +12,7 @@ from uuv_marl.scenario import Scenario
 class Trained:
     """Type of a learned policy: call it with a scenario, as a subclass of ``Policy``.
 
-    Args:
-        name: the policy's name in messages.
-        path: path of the checkpoint, or the name of one that ships (``load_checkpoint``); read on first use.
-        doc: the policy's docstring.
+    ``path`` is a checkpoint's path, or the name of one that ships (``load_checkpoint``), read on first use.
     """
 
     def __init__(self, name: str, path: UserPath, doc: str = "A network from a training.") -> None:

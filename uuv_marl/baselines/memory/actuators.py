@@ -19,12 +19,12 @@ from uuv_marl.sim.compiled import compiled
 ASKED, ACTED, ASKED_BEFORE, ACTED_BEFORE, SQUARES, PRODUCTS = 0, 1, 2, 3, 4, 10
 """Columns of ``Surroundings.actuators``: g and f of the latest period and of that before, six sums of products of the
 regressors (f_(k-1), g_k, g_(k-1)), and three of the regressors with f_k - g_k."""
-_KEPT_S = 5.0  # time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg.
-_NOTHING = 1e-3
+_FORGETTING_S = 5.0  # time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg.
+_REGULARIZATION = 1e-3
 """Sum of squared changes below which the estimate stays at ideal actuators (3 % of full thrust or torque)."""
-_LONGEST = 0.97
+_MAX_DECAY = 0.97
 """Largest e. Assumed: a lag of 3 s at a decision every 0.1 s, more than any actuator of the catalogue has."""
-_MISSING = 0.3
+_FULL_SHORTFALL = 0.3
 """Immediate shortfall at which the correction has full weight [1]. Assumed: in a current 0.97 to 1.05 of a demand acts
 at once, on a tuning field, and 0.63 with a lag of 0.1 s."""
 _LEAST, _MOST = 0.05, 1.5  # bounds of s. Assumed: an effectiveness of 5 % can't be compensated.
@@ -40,7 +40,7 @@ def identify(w: int, i: int, axis: int, asked: float, off: float, period: float,
     at = memory.actuators[w, i, axis]
     f, g, h = at[ACTED] - at[ACTED_BEFORE], asked - at[ASKED], at[ASKED] - at[ASKED_BEFORE]
     y = off - (at[ACTED] - at[ASKED])
-    share = max(1.0 - period / _KEPT_S, 0.0)
+    share = max(1.0 - period / _FORGETTING_S, 0.0)
     at[SQUARES] = share * at[SQUARES] + f * f
     at[SQUARES + 1] = share * at[SQUARES + 1] + f * g
     at[SQUARES + 2] = share * at[SQUARES + 2] + f * h
@@ -58,18 +58,18 @@ def identify(w: int, i: int, axis: int, asked: float, off: float, period: float,
 def answer(w: int, i: int, axis: int, memory: Surroundings) -> tuple[float, float, float]:
     """Remaining share of a difference after a period, effectiveness, and its immediate part: at first 0, 1 and 1."""
     at = memory.actuators[w, i, axis]
-    d_0 = at[SQUARES] + _NOTHING  # L D L' of the sums
+    d_0 = at[SQUARES] + _REGULARIZATION  # L D L' of the sums
     l_1, l_2 = at[SQUARES + 1] / d_0, at[SQUARES + 2] / d_0
-    d_1 = at[SQUARES + 3] + _NOTHING - l_1 * at[SQUARES + 1]
+    d_1 = at[SQUARES + 3] + _REGULARIZATION - l_1 * at[SQUARES + 1]
     between = at[SQUARES + 4] - l_1 * at[SQUARES + 2]
     l_3 = between / d_1
-    d_2 = at[SQUARES + 5] + _NOTHING - l_2 * at[SQUARES + 2] - l_3 * between
+    d_2 = at[SQUARES + 5] + _REGULARIZATION - l_2 * at[SQUARES + 2] - l_3 * between
     y_1 = at[PRODUCTS + 1] - l_1 * at[PRODUCTS]
     y_2 = at[PRODUCTS + 2] - l_2 * at[PRODUCTS] - l_3 * y_1
     c_2 = y_2 / d_2
     c_1 = (y_1 - between * c_2) / d_1
     e = (at[PRODUCTS] - at[SQUARES + 1] * c_1 - at[SQUARES + 2] * c_2) / d_0
-    e = min(max(e, 0.0), _LONGEST)
+    e = min(max(e, 0.0), _MAX_DECAY)
     return e, min(max((1.0 + c_1 + c_2) / (1.0 - e), _LEAST), _MOST), 1.0 + c_1
 
 
@@ -84,6 +84,6 @@ def lead(w: int, i: int, axis: int, wanted: float, share: float, memory: Surroun
     e, s, at_once = answer(w, i, axis, memory)
     m = (1.0 + 4.0 * math.sqrt(e) + e) / 6.0  # Simpson's rule for the mean of exp(-t / T)
     acts = s * at[ASKED] + (at[ACTED] - s * at[ASKED]) * e / m
-    asked = (wanted - e * acts) / max(s * (1.0 - e), 1.0 - _LONGEST)
-    counts = share * min(max(1.0 - at_once, 0.0) / _MISSING, 1.0)
+    asked = (wanted - e * acts) / max(s * (1.0 - e), 1.0 - _MAX_DECAY)
+    counts = share * min(max(1.0 - at_once, 0.0) / _FULL_SHORTFALL, 1.0)
     return wanted + counts * (min(max(asked, -1.0), 1.0) - wanted)

@@ -82,18 +82,18 @@ def update_neighbours(w: int, i: int, see: Fields, period: float, memory_s: floa
             p_x, p_y = float(see.neighbour[w, i, s, 0]), float(see.neighbour[w, i, s, 1])
             x, y = to_map(p_x, p_y, memory.pose[w, i])
             reach = math.hypot(p_x, p_y)
-            k = _match(x, y, reach, w, i, memory)
+            k = _associated_track(x, y, reach, w, i, memory)
             if k >= 0:
-                _follow(w, i, k, x, y, reach, memory)
-            elif not _is_detected(x, y, w, i, memory):
-                _meet(w, i, x, y, memory)
+                _correct_track(w, i, k, x, y, reach, memory)
+            elif not _is_repeated(x, y, w, i, memory):
+                _begin_track(w, i, x, y, memory)
     for k in range(known.shape[0]):
         if known[k] < 0.0:
             known[k] = 0.0 if since[k] > memory_s else -known[k]
 
 
 @compiled
-def _match(x: float, y: float, reach: float, w: int, i: int, memory: Surroundings) -> int:
+def _associated_track(x: float, y: float, reach: float, w: int, i: int, memory: Surroundings) -> int:
     """Index of the track predicted nearest to a detection, -1 for none within the gate.
 
     x and y are the detection in the map [m], ``reach`` is its range [m].
@@ -109,7 +109,7 @@ def _match(x: float, y: float, reach: float, w: int, i: int, memory: Surrounding
 
 
 @compiled
-def _is_detected(x: float, y: float, w: int, i: int, memory: Surroundings) -> bool:
+def _is_repeated(x: float, y: float, w: int, i: int, memory: Surroundings) -> bool:
     """Whether an overlapping sub-sector has detected the same vehicle at this decision."""
     for k in range(memory.known.shape[2]):
         dx, dy = x - memory.reading[w, i, k, 0], y - memory.reading[w, i, k, 1]
@@ -119,8 +119,8 @@ def _is_detected(x: float, y: float, w: int, i: int, memory: Surroundings) -> bo
 
 
 @compiled
-def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, memory: Surroundings) -> None:
-    """Correct a track by a reading. x, y and ``reach`` as for ``_match``."""
+def _correct_track(w: int, i: int, k: int, x: float, y: float, reach: float, memory: Surroundings) -> None:
+    """Correct a track by a reading. x, y and ``reach`` as for ``_associated_track``."""
     place, velocity, last = memory.place[w, i, k], memory.velocity[w, i, k], memory.reading[w, i, k]
     memory.known[w, i, k] = 1.0 - memory.known[w, i, k]
     since = memory.since[w, i, k]
@@ -137,7 +137,7 @@ def _follow(w: int, i: int, k: int, x: float, y: float, reach: float, memory: Su
 
 
 @compiled
-def _meet(w: int, i: int, x: float, y: float, memory: Surroundings) -> None:
+def _begin_track(w: int, i: int, x: float, y: float, memory: Surroundings) -> None:
     """Begin a track that moves as l(t) does; without a free row, it replaces the one undetected for longest."""
     best, most = 0, -1.0
     for k in range(memory.known.shape[2]):

@@ -20,7 +20,7 @@ from uuv_marl.sim.vehicle import STILL, Plant, State6, actuators, advance, held,
 from uuv_marl.types import Float32, Float64
 
 _MOVES_MPS = 0.005  # speed above which l(t) counts as moving; scenarios allow no speed below 0.01 m/s
-_TENTH = 0.1
+_PROBE = 0.1
 """Share of full thrust and torque for the model's gains: small, so that the direction hardly changes in a turn."""
 FARTHEST_FIX_M = MAX_RANGE_M * (1.0 - 1e-6)  # a longer vector to l(t) is clipped and gives no fix [m]
 _TURN_TOLERANCE = 0.001
@@ -48,8 +48,8 @@ class DeadReckoning(NamedTuple):
             plant(scenario), timing.control_steps_per_decision, timing.integration_steps_per_control_step,
             timing.integration_step_s, timing.decision_period_s, 1.0, 1.0,
         )  # fmt: skip
-        surge = reckoned(still, np.array([_TENTH, 0.0]), own)[3] / _TENTH
-        return own._replace(surge=surge, yaw=reckoned(going, np.array([0.0, _TENTH]), own)[5] / _TENTH)
+        surge = reckoned(still, np.array([_PROBE, 0.0]), own)[3] / _PROBE
+        return own._replace(surge=surge, yaw=reckoned(going, np.array([0.0, _PROBE]), own)[5] / _PROBE)
 
 
 @compiled
@@ -156,7 +156,7 @@ def move(w: int, i: int, see: Fields, own: DeadReckoning, memory: Surroundings) 
 
 
 @compiled
-def keep_motion(w: int, i: int, see: Fields, memory: Surroundings) -> None:
+def store_motion(w: int, i: int, see: Fields, memory: Surroundings) -> None:
     """Store own velocity and l(t)'s speed for the next percept."""
     memory.motion[w, i, 0], memory.motion[w, i, 1] = see.velocity[w, i, 0], see.velocity[w, i, 1]
     memory.motion[w, i, 2] = see.yaw_rate[w, i, 0]

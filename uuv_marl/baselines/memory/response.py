@@ -12,8 +12,8 @@ from uuv_marl.sim.compiled import compiled
 
 ACTED, MISSED, DUE, PRODUCTS, SQUARES = range(5)
 """Columns of ``Surroundings.response``: f, y, x, and the running sums of dx dy and dx^2."""
-_KEPT_S = 5.0  # time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg.
-_NOTHING = 0.01
+_FORGETTING_S = 5.0  # time constant of the sums [s]. Assumed: some turns long, and far shorter than a leg.
+_REGULARIZATION = 0.01
 """Sum of squared changes of an action below which the estimate stays near 0: one of a tenth, a hundred of 1 %."""
 
 
@@ -27,7 +27,7 @@ def follow(w: int, i: int, axis: int, asked: float, off: float, period: float, m
     at = memory.response[w, i, axis]
     due = at[ACTED] - asked
     d_x, d_y = due - at[DUE], off - at[MISSED]
-    share = max(1.0 - period / _KEPT_S, 0.0)
+    share = max(1.0 - period / _FORGETTING_S, 0.0)
     at[PRODUCTS] = share * at[PRODUCTS] + d_x * d_y
     at[SQUARES] = share * at[SQUARES] + d_x * d_x
     at[ACTED], at[MISSED], at[DUE] = asked + off, off, due
@@ -37,4 +37,4 @@ def follow(w: int, i: int, axis: int, asked: float, off: float, period: float, m
 def remains(w: int, i: int, axis: int, memory: Surroundings) -> float:
     """Mean share of the difference between previous force and demand that remains over a period, 0 to 1."""
     at = memory.response[w, i, axis]
-    return min(max(at[PRODUCTS] / (at[SQUARES] + _NOTHING), 0.0), 1.0)
+    return min(max(at[PRODUCTS] / (at[SQUARES] + _REGULARIZATION), 0.0), 1.0)

@@ -53,14 +53,14 @@ def update_memory(
                 pose.begin_map(w, i, see, memory)
             else:
                 pose.move(w, i, see, model.own, memory)
-            pose.keep_motion(w, i, see, memory)
+            pose.store_motion(w, i, see, memory)
             discs.update_discs(w, i, see, model.sectors, memory)
             neighbours.update_neighbours(w, i, see, model.own.period_s, memory_s, memory)
-            _keep_distances(w, i, memory)
+            _store_distances(w, i, memory)
 
 
 @compiled
-def _keep_distances(w: int, i: int, memory: Surroundings) -> None:
+def _store_distances(w: int, i: int, memory: Surroundings) -> None:
     """Store the distances of remembered obstacles and neighbours."""
     x, y = memory.pose[w, i, 0], memory.pose[w, i, 1]
     for d in range(memory.score.shape[2]):

@@ -27,12 +27,7 @@ from uuv_marl.types import Bool, Float32, Float64
 
 
 class Guarded(Filtered):
-    """A policy inside the safety filter.
-
-    Args:
-        inner: the policy that decides, made for the same scenario and worlds.
-        barrier: margins and rates of the filter.
-    """
+    """An inner policy, made for the same scenario and worlds, inside the safety filter."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: Policy, barrier: Barrier = GUARD) -> None:
         self.inner = inner

@@ -63,9 +63,8 @@ class Carrot(Scout):
 class CarrotInformed(Carrot):
     """``carrot`` on a given collision-free path: for tasks with the channel ``path``.
 
-    Args:
-        waits: whether a vehicle without right of way stays, where the task has right of way.
-        speed: of the carrot [m/s]: that of l(t) in the paper, as no exploration is needed.
+    With ``waits``, a vehicle without right of way stays. ``speed`` is that of l(t) in the paper, as no exploration is
+    needed.
     """
 
     requirements = Carrot.requirements._replace(channels=("path",))

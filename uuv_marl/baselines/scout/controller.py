@@ -28,13 +28,7 @@ from uuv_marl.types import Bool, Float32, Float64
 class Scout(Filtered):
     """Feed-forward and pull, pushes among near neighbours, a flow around remembered obstacles, and the safety filter.
 
-    Args:
-        preset: name of a preset, of ``PRESETS``.
-        gains: replace the preset's.
-        barrier: margins and rates of the safety filter; replace the preset's.
-
-    Raises:
-        PolicyError: the preset is unknown.
+    ``preset`` is a name of ``PRESETS``, else PolicyError is raised; ``gains`` and ``barrier`` replace the preset's.
     """
 
     def __init__(
@@ -53,16 +47,16 @@ class Scout(Filtered):
         """Time for which an undetected neighbour is remembered [s]."""
         return float(self.gains.memory_s)
 
-    def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it was remembered
+    def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it is in the memory
         """Actions of shape (world, vehicle, 2)."""
         action = np.zeros((self.num_worlds, self.scenario.swarm.num_vehicles, 2), np.float32)
         decide_all(
-            self.active, self.model.own.period_s, self._grown(), self.barrier, self.limits, self.gain, self.memory,
-            self.planes, action,
+            self.active, self.model.own.period_s, self._scaled_gains(), self.barrier, self.limits, self.gain,
+            self.memory, self.planes, action,
         )  # fmt: skip
         return action
 
-    def _grown(self) -> ScoutGains:
+    def _scaled_gains(self) -> ScoutGains:
         """The gains for the swarm's size, all float: other types would compile the kernels again."""
         gains, g = ScoutGains(*map(float, self.gains)), self._growth
         return gains._replace(
@@ -72,7 +66,7 @@ class Scout(Filtered):
 
 
 @compiled
-def wary(g: ScoutGains, share: float) -> ScoutGains:
+def uncertain_gains(g: ScoutGains, share: float) -> ScoutGains:
     """Gains at an uncertainty ``share`` from 0 to 1: pull and push change."""
     pull, push = math.exp(share * g.pull_if_uncertain), math.exp(share * g.push_if_uncertain)
     return ScoutGains(
@@ -154,7 +148,11 @@ def decide_all(
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and memory.begun[w, i] > 0.0:
-                own = wary(g, uncertainty(w, i, memory)) if adapts and memory.reference_speed[w, i] > 0.0 else g
+                own = (
+                    uncertain_gains(g, uncertainty(w, i, memory))
+                    if adapts and memory.reference_speed[w, i] > 0.0
+                    else g
+                )
                 w_x, w_y = desired_velocity(w, i, own, memory)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, memory)
                 num = planes_of(w, i, period, barrier, memory, planes)

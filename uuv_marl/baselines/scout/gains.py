@@ -10,33 +10,21 @@ from uuv_marl.baselines.safety.barrier import Barrier, with_numbers
 class ScoutGains(NamedTuple):
     """Gains of the desired velocity and of memory, for all scenarios, swarm sizes, echoes and decision periods."""
 
-    pull: float = 0.05
-    """To l(t) [1/s], for up to 54 vehicles; divided by g = sqrt(n / 54) for larger, wider swarms."""
-    push: float = 10.0
-    """Away from a neighbour at distance 0 [m/s], falling linearly to 0 at ``push_range``."""
-    push_range: float = 12.0
-    """Range of pushes [m]: so near, detection is mutual, and pushes cancel over the swarm."""
-    pull_at_rest: float = 4.0
-    """Factor of the pull while l(t) rests [1]; times sqrt(g) for larger swarms."""
-    push_at_rest: float = 2.0
-    """Factor of the push while l(t) rests [1]; times g for larger swarms, which are pressed from outside."""
+    pull: float = 0.05  # to l(t) [1/s] for up to 54 vehicles; divided by g = sqrt(n / 54) for larger, wider swarms
+    push: float = 10.0  # away from a neighbour at distance 0 [m/s], falling linearly to 0 at ``push_range``
+    push_range: float = 12.0  # [m]: so near, detection is mutual, and pushes cancel over the swarm
+    pull_at_rest: float = 4.0  # factor of the pull while l(t) rests [1]; times sqrt(g) for larger swarms
+    push_at_rest: float = 2.0  # factor of the push while l(t) rests [1]; times g for larger swarms
+    # while l(t) moves, pull of the neighbours' mean position to it [1/s]; divided by g^3 for larger swarms
     together: float = 0.0
-    """While l(t) moves, pull to it from the mean position of detected neighbours [1/s]; divided by g^3, as in a large
-    swarm they are a small part of it. The swarm moves as a whole, without being pressed together."""
-    behind_m: float = 0.0
-    """Distance behind a moving l(t) to aim at [m]: a swarm coasts on for about 2 m where l(t) stops."""
+    behind_m: float = 0.0  # distance behind a moving l(t) to aim at [m]: a swarm coasts on for about 2 m
+    # factor of the force that follows the desired velocity [1]; less is calmer, and tolerates lag
     steering: float = 1.0
-    """Factor of the force that follows the desired velocity [1]. Less is calmer, and tolerates actuator lag."""
-    memory_s: float = MEMORY_S
-    """Time for which an undetected neighbour is remembered [s]."""
+    memory_s: float = MEMORY_S  # time for which an undetected neighbour is remembered [s]
+    # share of actuator lag and weakness that is compensated (``memory.actuators``) [1]; not with a rudder
     lead: float = 0.0
-    """Share of identified actuator lag and weakness that is compensated (``memory.actuators``) [1]. Not with a rudder,
-    whose angle is chosen later."""
-    pull_if_uncertain: float = 0.0
-    """While l(t) moves, added to the logarithm of the pull at full uncertainty (``memory.uncertainty``), and in
-    proportion below [1]."""
-    push_if_uncertain: float = 0.0
-    """The same for the push [1]: a vehicle that knows less about neighbours' positions keeps farther from them."""
+    pull_if_uncertain: float = 0.0  # while l(t) moves, added to the logarithm of the pull at full ``uncertainty`` [1]
+    push_if_uncertain: float = 0.0  # the same for the push [1]: uncertain vehicles keep farther from neighbours
 
 
 class Preset(NamedTuple):

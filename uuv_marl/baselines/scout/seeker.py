@@ -60,13 +60,8 @@ _AHEAD_M = 40.0  # distance ahead at which a vehicle returns to its lane [m]. As
 class NearestTarget(Filtered):
     """Search a box, then stay near the nearest detected target that no other vehicle is nearer to.
 
-    Args:
-        lanes: whether to search in lanes across the box, one for each vehicle, instead of straight on.
-        gains: free parameters; replace those tuned for this search.
-        barrier: margins and rates of the safety filter; replace the tuned ones.
-
-    Raises:
-        PolicyError: the scenario's task has no box.
+    With ``lanes`` each vehicle searches in its own lane across the box, else straight on; ``gains`` and ``barrier``
+    replace those tuned for this search. Raises PolicyError if the scenario's task has no box.
     """
 
     Memory: ClassVar[type[Any] | None] = SeekerMemory
@@ -95,7 +90,7 @@ class NearestTarget(Filtered):
         for name in ("echo", "echo_range", "echo_position"):
             seen[name][:] = 0.0
         update_memory(self.flat(seen), self.layout.offsets, worlds, self.model, self.memory_s, self._surroundings)
-        stay_behind(
+        update_tracks(
             self.flat(percept), self.layout.offsets, worlds, percept["box"], period, self._half_m, self._lanes,
             SeekerGains(*map(float, self.gains)), self._surroundings, self._track,
         )  # fmt: skip
@@ -144,7 +139,7 @@ def _detected_target(
 
 
 @compiled
-def stay_behind(
+def update_tracks(
     flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
     memory: Surroundings, track: TrackedTarget,
 ) -> None:  # fmt: skip
@@ -213,7 +208,7 @@ def _searching(
 
 
 @compiled
-def _keeping(w: int, i: int, g: SeekerGains, memory: Surroundings, track: TrackedTarget) -> tuple[float, float]:
+def _following(w: int, i: int, g: SeekerGains, memory: Surroundings, track: TrackedTarget) -> tuple[float, float]:
     """Desired velocity behind the target, or to one that is not detected, in the map [m/s]."""
     goal, pose = track.target[w, i], memory.pose[w, i]
     x, y, v_x, v_y = goal[0] - pose[0], goal[1] - pose[1], goal[2], goal[3]
@@ -235,7 +230,7 @@ def seek(
         for i in range(flat.shape[1]):
             if worlds[w] and memory.begun[w, i] > 0.0:
                 if track.track_timeout_s[w, i] > 0.0:
-                    w_x, w_y = _keeping(w, i, g, memory, track)
+                    w_x, w_y = _following(w, i, g, memory, track)
                 else:
                     w_x, w_y = _searching(w, i, half_m, lanes, see, box, g.speed, memory, track)
                 w_x, w_y = pushed(w_x, w_y, w, i, g.push, g.push_range, memory)

@@ -12,10 +12,9 @@ from uuv_marl.benchmark.robustness.figure import draw
 from uuv_marl.benchmark.robustness.job import EPISODES, read_episodes
 from uuv_marl.benchmark.robustness.scores import EVERY, axis_score, by_seed, group_score, scored
 from uuv_marl.benchmark.style import house_style, save
-from uuv_marl.benchmark.tables import markdown_table
+from uuv_marl.benchmark.tables import NOTHING, markdown_table
 from uuv_marl.scenario import IDEAL, conditions, load_scenario, scenario_names
 
-_NOTHING = "–"
 _GROUPS = [*(group for group in GROUPS if group != "X"), EVERY, "X"]
 
 
@@ -69,8 +68,8 @@ def _scores(table: Any) -> str:
     rows: list[tuple[float, tuple[str, ...]]] = []
     for policy, own in table.groupby(level="policy", sort=False):
         scores = {group: group_score(own, group) for group in _GROUPS}
-        cells = [f"{s:.2f}" if s and g == EVERY else f"{s.value:.2f}" if s else _NOTHING for g, s in scores.items()]
-        calm = f"{scored(own[CALM].dropna().to_numpy()).value:.2f}" if CALM in own else _NOTHING
+        cells = [f"{s:.2f}" if s and g == EVERY else f"{s.value:.2f}" if s else NOTHING for g, s in scores.items()]
+        calm = f"{scored(own[CALM].dropna().to_numpy()).value:.2f}" if CALM in own else NOTHING
         best = scores[EVERY] or scores["X"]
         rows.append((best.value if best else -1.0, (policy, f"{len(own)}", calm, *cells)))
     head = ("policy", "seeds", "undisturbed", *(GROUPS.get(group, group) for group in _GROUPS))
@@ -81,11 +80,11 @@ def _axes(table: Any) -> str:
     """A row for each axis that was run, a column for each policy: the mean success over the levels."""
     policies = dict[str, Any](iter(table.groupby(level="policy", sort=False)))
     rows = [(name, AXES[name].title, *_successes(policies, name)) for name in AXES]
-    shown = [row for row in rows if any(cell != _NOTHING for cell in row[2:])]
+    shown = [row for row in rows if any(cell != NOTHING for cell in row[2:])]
     return markdown_table(("axis", "disturbance", *policies), shown)
 
 
 def _successes(policies: dict[str, Any], axis: str) -> Iterator[str]:
     for own in policies.values():
         score = axis_score(own, axis)
-        yield f"{score.value:.2f}" if score else _NOTHING
+        yield f"{score.value:.2f}" if score else NOTHING

@@ -181,7 +181,7 @@ def take_readings(w: int, world: World, at: Starts, disturbances: Disturbances) 
     for a in range(0 if timing.ideal else timing.every.shape[0]):
         number = due(tick - readings.began[w], timing.every[a], timing.delay, timing.control_steps)
         if number >= 0:
-            reading = Reading(w, a, number, tick, number % readings.detected_index.shape[1])
+            reading = Reading(w, a, number, tick, number % readings.target_index.shape[1])
             num = collect(reading, world, see, timing, disturbances.navigation_errors, readings, detections)
             add_errors(reading, num, key, timing.active[a] == timing.active[a + 1], noise, errors, detections)
             store(reading, num, timing, detections, readings)

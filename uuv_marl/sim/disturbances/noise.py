@@ -224,19 +224,19 @@ def add_false_echoes(
     first, end = timing.first[a], timing.first[a + 1]
     passive = timing.active[a] == timing.active[a + 1]
     # Offset from an active array's sub-sectors to its echoes.
-    beyond = 0 if passive else readings.detected_index.shape[3] - timing.active[-1] + timing.active[a] - first
-    for i in range(readings.detected_index.shape[2]):
+    beyond = 0 if passive else readings.target_index.shape[3] - timing.active[-1] + timing.active[a] - first
+    for i in range(readings.target_index.shape[2]):
         detections.code[w, i] = first + gap(uniform(key, FALSE_ECHO, at.tick, i, first), noise.false_echo)
-    for i in range(readings.detected_index.shape[2]):
+    for i in range(readings.target_index.shape[2]):
         k = detections.code[w, i]
         while k < end:  # from one to the next, so that a vehicle without any costs one draw
             far, side = uniforms(key, FALSE_PLACE, at.tick, i, k)
             away = noise.range[a] * far if noise.passive_ranges or not passive else noise.nominal_range
             place = k + beyond
-            empty = readings.detected_index[w, slot, i, place] == NO_DETECTION
+            empty = readings.target_index[w, slot, i, place] == NO_DETECTION
             if empty or np.float32(away) < readings.reach[w, slot, i, place]:
                 c, s = cos_sin(noise.width[a] * (1.0 - side))
-                readings.detected_index[w, slot, i, place] = FALSE_DETECTION if passive else OBSTACLE
+                readings.target_index[w, slot, i, place] = FALSE_DETECTION if passive else OBSTACLE
                 readings.reach[w, slot, i, place] = away
                 readings.position[w, slot, i, place, 0] = away * (c * noise.lower[k, 0] - s * noise.lower[k, 1])
                 readings.position[w, slot, i, place, 1] = away * (s * noise.lower[k, 0] + c * noise.lower[k, 1])

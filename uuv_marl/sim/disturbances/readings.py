@@ -28,7 +28,7 @@ Move = tuple[float, float, float, float]
 """Cosine and sine of a vehicle's turn, then its motion ahead and abeam at its present heading [m]."""
 
 NO_DETECTION, FALSE_DETECTION, OBSTACLE = -1, -2, -3
-"""Values of ``detected_index`` for no detection, a false vehicle and an obstacle."""
+"""Values of ``target_index`` for no detection, a false vehicle and an obstacle."""
 
 
 @described
@@ -45,7 +45,7 @@ class Readings(NamedTuple):
         "world slot vehicle array 4",
         "Own estimated position at reception [m], cosine and sine of the heading.",
     ]
-    detected_index: Annotated[
+    target_index: Annotated[
         Int32, "world slot vehicle place", "Index of the vehicle detected, or a negative constant of this module.",
         Bounds(OBSTACLE, "vehicle"),
     ]  # fmt: skip
@@ -58,7 +58,7 @@ class Detections(NamedTuple):
     """All detections of one array of all vehicles in a reading, one after the other."""
 
     code: Annotated[Int64, "world hit", "Index of the listener, shifted left by ``SHIFT``, plus the place."]
-    detected_index: Annotated[Int64, "world hit", "As in ``Readings``."]
+    target_index: Annotated[Int64, "world hit", "As in ``Readings``."]
     reach: Annotated[Float64, "world hit", "Range [m], negative if missed."]
     x: Annotated[Float64, "world hit", "Distance ahead of its position [m]."]
     y: Annotated[Float64, "world hit", "Distance to starboard [m]."]
@@ -93,7 +93,7 @@ def begin_line(w: int, state: State, readings: Readings) -> None:
     """Start the arrays of world w with an empty delay line, as if all vehicles had been at rest before."""
     readings.began[w] = state.tick[w]
     readings.past[w], readings.pose[w], readings.reach[w], readings.position[w] = 0.0, 0.0, 0.0, 0.0
-    readings.detected_index[w] = NO_DETECTION
+    readings.target_index[w] = NO_DETECTION
     remember(w, state, readings)
 
 
@@ -145,13 +145,13 @@ def collect(
                 ago = math.sqrt(ahead * ahead + abeam * abeam) * timing.control_steps_per_metre
                 north, east = was_at(w, j, at.tick, ago, readings)
                 ahead, abeam = c * (north - x) + s * (east - y), c * (east - y) - s * (north - x)
-            detections.code[w, num], detections.detected_index[w, num] = (i << SHIFT) + k, j
+            detections.code[w, num], detections.target_index[w, num] = (i << SHIFT) + k, j
             detections.x[w, num], detections.y[w, num] = ahead, abeam
             detections.reach[w, num] = math.sqrt(ahead * ahead + abeam * abeam)
             num += 1
         for e in range(timing.active[a], timing.active[a + 1]):
             if see.echo[w, i, e] > 0.0:
-                detections.code[w, num], detections.detected_index[w, num] = (i << SHIFT) + sectors + e, OBSTACLE
+                detections.code[w, num], detections.target_index[w, num] = (i << SHIFT) + sectors + e, OBSTACLE
                 detections.x[w, num] = see.echo_position[w, i, e, 0]
                 detections.y[w, num] = see.echo_position[w, i, e, 1]
                 detections.reach[w, num] = see.echo_range[w, i, e]
@@ -162,13 +162,13 @@ def collect(
 @compiled_inner
 def store(at: Reading, num: int, timing: SonarTiming, detections: Detections, readings: Readings) -> None:
     """Store those of the first ``num`` detections that are not missed in the delay line; clear all other places."""
-    for i in range(readings.detected_index.shape[2]):
+    for i in range(readings.target_index.shape[2]):
         clear_array(at, i, timing, readings)
     w, slot = at.w, at.slot
     for q in range(num):
         if detections.reach[w, q] >= 0.0:
             i, k = detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE
-            readings.detected_index[w, slot, i, k] = detections.detected_index[w, q]
+            readings.target_index[w, slot, i, k] = detections.target_index[w, q]
             readings.reach[w, slot, i, k] = detections.reach[w, q]
             readings.position[w, slot, i, k, 0] = detections.x[w, q]
             readings.position[w, slot, i, k, 1] = detections.y[w, q]
@@ -177,11 +177,11 @@ def store(at: Reading, num: int, timing: SonarTiming, detections: Detections, re
 @compiled_inner
 def clear_array(at: Reading, i: int, timing: SonarTiming, readings: Readings) -> None:
     """Remove all detections of an array of vehicle i from a reading."""
-    sectors = readings.detected_index.shape[3] - timing.active[-1]
+    sectors = readings.target_index.shape[3] - timing.active[-1]
     for k in range(timing.first[at.a], timing.first[at.a + 1]):
-        readings.detected_index[at.w, at.slot, i, k] = NO_DETECTION
+        readings.target_index[at.w, at.slot, i, k] = NO_DETECTION
     for e in range(timing.active[at.a], timing.active[at.a + 1]):
-        readings.detected_index[at.w, at.slot, i, sectors + e] = NO_DETECTION
+        readings.target_index[at.w, at.slot, i, sectors + e] = NO_DETECTION
 
 
 # --- From the delay line into percepts ---
@@ -197,7 +197,7 @@ def write_readings(
     for a in range(timing.every.shape[0]):
         number = latest(since - timing.delay, timing.every[a])
         taken = readings.began[w] + control_step_of(max(number, 0), timing.every[a])  # the first one before any
-        at = Reading(w, a, number, taken, number % readings.detected_index.shape[1])
+        at = Reading(w, a, number, taken, number % readings.target_index.shape[1])
         carries = timing.compensated and number >= 0 and taken != tick
         for i in range(world.state.alive.shape[1]):
             if not world.state.alive[w, i]:
@@ -221,7 +221,7 @@ def write_vehicle_readings(
     for k in range(timing.first[at.a], timing.first[at.a + 1]):
         j, x, y = NO_DETECTION, 0.0, 0.0
         if at.number >= 0:
-            j = readings.detected_index[w, slot, i, k]
+            j = readings.target_index[w, slot, i, k]
         if j != NO_DETECTION:
             x, y = np.float64(readings.position[w, slot, i, k, 0]), np.float64(readings.position[w, slot, i, k, 1])
             x, y = carried(x, y, move)
@@ -239,7 +239,7 @@ def write_echo_readings(at: Reading, i: int, move: Move, timing: SonarTiming, re
     w, slot = at.w, at.slot
     for e in range(timing.active[at.a], timing.active[at.a + 1]):
         k, reach, x, y = see.detected.shape[2] + e, -1.0, 0.0, 0.0
-        if at.number >= 0 and readings.detected_index[w, slot, i, k] != NO_DETECTION:
+        if at.number >= 0 and readings.target_index[w, slot, i, k] != NO_DETECTION:
             x, y = np.float64(readings.position[w, slot, i, k, 0]), np.float64(readings.position[w, slot, i, k, 1])
             far = math.sqrt(x * x + y * y)
             x, y = carried(x, y, move)
