@@ -313,7 +313,7 @@ def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path,
     frame = load(tmp_path / "out")
     np.testing.assert_array_equal(frame["spread_m"], [run["metrics"]["task"]["spread_m"] for run in runs])
     assert {*frame.columns} <= {"spread_m", "success_share", "swarm_success", *MEASURED}
-    assert _outcome(runs[0]["metrics"]).startswith("0% untouched and there, ")
+    assert _outcome(runs[0]["metrics"]).startswith("success 0%, ")
     done = CliRunner().invoke(app, ["replay", *how, "--output", str(tmp_path / "replay.html")])
     assert done.exit_code == 0, done.output
     assert (tmp_path / "replay.html").stat().st_size > 10_000
