@@ -374,7 +374,9 @@ def test_a_training_begins_with_its_whole_objective(tmp_path, own_task, no_valid
     assert "Reward dense of task own_task:Mine on starter\n" in own
     assert "\n  collision: -60 for each\nNothing is added to the reward; discount" in own
     assert objective(small(reward="own_task:mine")).startswith("Reward own_task:mine on starter\nNothing is added")
-    several = objective(Training(scenario="hard_water", also=["hard_water_hard", "random_field"], sizes=[2, 3]))
+    several = objective(
+        Training(scenario="hard_water", extra_scenarios=["hard_water_hard", "random_field"], sizes=[2, 3])
+    )
     assert several.count("Reward dense of task") == 2
     assert "task hard_water on hard_water, hard_water_hard\n" in several
 
@@ -383,7 +385,7 @@ def test_one_network_learns_on_several_scenarios(tmp_path):
     short = {"time_limit.factor": 0.01, "time_limit.extra_s": 3.0}
     (tmp_path / "short.toml").write_text('extends = "training_field"\n[time_limit]\nfactor = 0.01\nextra_s = 3.0\n')
     several = Training(
-        scenario="starter", also=[str(tmp_path / "short.toml")], overrides=short, sizes=[(3, 2)], steps=1,
+        scenario="starter", extra_scenarios=[str(tmp_path / "short.toml")], overrides=short, sizes=[(3, 2)], steps=1,
         ppo=TINY, validations=1, validation_episodes=2,
     )  # fmt: skip
     env = rows_for(several)
@@ -701,7 +703,7 @@ def test_a_folder_says_why_it_can_not_go_on_here_and_what_made_it_so_far(tmp_pat
 @pytest.mark.parametrize("law", ["mappo", "mine:Law", "./runs/best"])
 def test_a_network_is_around_a_law_that_ships(law, tmp_path):
     with pytest.raises(PolicyError, match=f"around one of the laws bio_inspired, .*, got '{law}'"):
-        Training(around=law)
+        Training(base_controller=law)
     card = card_for(load_scenario("starter")).model_copy(update={"base_controller": law})
     save_checkpoint(tmp_path / WEIGHTS_FILE, card, tensors(card))
     with pytest.raises(PolicyError, match="around one of the laws"):
@@ -887,13 +889,13 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
     assert [(part.vehicles, part.worlds) for part in plain.parts] == [(5, 128)]
     assert plain.loaded == load_scenario("starter"), "which fixes period and inner loop"
     assert plain.card.policy_class == "end to end"
-    mixed = Training(scenario="hard_water", also=["hard_water_hard"], sizes=[10, (54, 2)])
+    mixed = Training(scenario="hard_water", extra_scenarios=["hard_water_hard"], sizes=[10, (54, 2)])
     assert [(part.name, part.vehicles, part.worlds) for part in mixed.parts] == [
         ("hard_water", 10, 16), ("hard_water", 54, 2), ("hard_water_hard", 10, 16), ("hard_water_hard", 54, 2),
     ]  # fmt: skip
     free = Training(scenario="random_field", steps=100).loaded
     assert (free.timing.decision_period_s, free.actuators.yaw_damping_nms) == (0.5, 600.0)
-    assert Training(scenario="starter", around="scout,preset=wary").loaded.actuators.yaw_damping_nms == 600.0
+    assert Training(scenario="starter", base_controller="scout,preset=wary").loaded.actuators.yaw_damping_nms == 600.0
     (tmp_path / "mine.toml").write_text('extends = "random_field"\n[swarm]\nnum_vehicles = 20\n')
     (tmp_path / "recipe.toml").write_text('scenario = "hard_water"\n[ppo]\ngamma = 0.98\n')
     mine = Training(**recipe_fields(str(tmp_path / "mine.toml")))
