@@ -12,7 +12,8 @@
 #
 # A task is a class whose methods give the start of an episode, the vehicles at their goal, the end of the episode, and
 # the reward. `self.swarm` is the simulation: `state` holds positions and velocities, `facts` distances and collisions.
-# All methods but `at_goal` have a default. Look at `at_goal`: it decides which vehicles succeed.
+# A task must define `draw`, `reward`, `at_goal` and `done`; all other methods have a default. Look at `at_goal`: it
+# decides which vehicles succeed.
 
 # %%
 # %%writefile meet.py
@@ -28,6 +29,8 @@ class Rendezvous(Task):
 
     class Numbers(Section):
         near_m: Positive = 10.0
+
+    rewards = {"dense": {"away": "-0.01/m for each decision", "collision": "-10 for each"}}
 
     def draw(self, world, rng):  # no vehicle observes l(t), and there are no obstacles
         drawn = super().draw(world, rng)
