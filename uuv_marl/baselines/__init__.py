@@ -27,4 +27,6 @@ from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.registry import POLICIES
 from uuv_marl.baselines.requirements import PolicyRequirements
 
-__all__ = ["POLICIES", "EnvPolicy", "Policy", "PolicyError", "PolicyRequirements", "make_policy", "with_policy_requirements"]
+__all__ = [
+    "POLICIES", "EnvPolicy", "Policy", "PolicyError", "PolicyRequirements", "make_policy", "with_policy_requirements",
+]  # fmt: skip
