@@ -28,11 +28,5 @@ from uuv_marl.baselines.registry import POLICIES
 from uuv_marl.baselines.requirements import PolicyRequirements
 
 __all__ = [
-    "POLICIES",
-    "EnvPolicy",
-    "Policy",
-    "PolicyError",
-    "PolicyRequirements",
-    "make_policy",
-    "with_policy_requirements",
-]
+    "POLICIES", "EnvPolicy", "Policy", "PolicyError", "PolicyRequirements", "make_policy", "with_policy_requirements",
+]  # fmt: skip

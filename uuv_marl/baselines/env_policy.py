@@ -15,7 +15,7 @@ from uuv_marl.types import Float32, Int64
 
 
 class HasSwarm(Protocol):
-    """The part of an environment that ``make_policy`` needs; the ``unwrapped`` of a wrapper is one of this package."""
+    """The part of an environment that ``make_policy`` needs; a wrapper has it through ``unwrapped``."""
 
     @property
     def unwrapped(self) -> Any:

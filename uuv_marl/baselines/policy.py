@@ -220,7 +220,7 @@ class Policy:
         if rows.shape != expected or rows.dtype != np.float32:
             raise PolicyError(
                 f"{self.name} was made for float32 percepts of shape {expected} (world, vehicle, entry), and got "
-                f"{rows.dtype} of shape {rows.shape}; use make_policy(name, scenario, num_worlds) for this swarm"
+                f"{rows.dtype} of shape {rows.shape}; make one for this swarm: make_policy(name, scenario, num_worlds)"
             )
         if percept.layout != self.layout:
             raise PolicyError(
