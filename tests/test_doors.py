@@ -104,7 +104,7 @@ def test_a_mask_of_other_worlds_is_refused(active):
         ("num_obstacles", 1000),
         ("losses", 1 << 40),
         ("losses", -1),
-        ("detected", 6),
+        ("detected_index", 6),
         ("diverged", 77),
         ("times", np.nan),
     ],
