@@ -194,10 +194,10 @@ def test_a_browser_reads_the_recording(tmp_path):
         assert_coded("heading", arrays["heading"][:, others], heading[:, others])
         assert_coded("inspected_heading", arrays["heading"][:, inspected], heading[:, inspected])
         for k, sonar in enumerate(recording.inspections.values()):
-            np.testing.assert_array_equal(arrays["detected"][:, k], sonar.detected_index)
+            np.testing.assert_array_equal(arrays["detected_index"][:, k], sonar.detected_index)
             for name in ("neighbour", "echo_range", "echo_position", "action"):
                 assert_coded(name, arrays[name][:, k], getattr(sonar, name))
-        assert ("detected" in arrays) == bool(inspected)
+        assert ("detected_index" in arrays) == bool(inspected)
 
 
 def saved(folder, policies=("idle", "random"), scenario=None):
@@ -260,9 +260,9 @@ def test_what_is_no_trace_is_explained(tmp_path):
         copy.write_bytes(path.read_bytes())
     for trace, message in (
         (tmp_path / "nothing.npz", "does not exist; give the folder of a benchmark"),
-        (foreign, "holds no results.json, .* simulate with --scenario and --policy"),
+        (foreign, "holds no results.json .* simulate with --scenario and --policy"),
         (stray, "is not the trace of a run in .*results.json"),
-        (path.with_name("lossy.random.1.npz"), "no routes: .* seed 0 .*: uuv-marl replay .*--policy random --seed 1"),
+        (path.with_name("lossy.random.1.npz"), "no trajectories: .* seed 0 .*: uuv-marl replay .*--policy random --seed 1"),
     ):
         with pytest.raises(ReplayError, match=message):
             from_trace(trace)
