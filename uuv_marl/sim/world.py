@@ -29,7 +29,7 @@ from uuv_marl.sim.stopping import stop_hulls
 from uuv_marl.sim.traffic import triangle
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import fields
+from uuv_marl.sim.views import disturbance_fields, fields
 from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Workspace
 from uuv_marl.types import Float32, Float64
 
@@ -241,8 +241,11 @@ def observe_world(w: int, world: World, model: Model, workspace: Workspace, dist
     perceive(w, world, model, workspace, grid, True)
     if disturbances is not None:
         begin_disturbances(w, world, disturbances)
-        take_readings(w, world, model.at, disturbances)
-        apply_disturbances(w, world, model.at, disturbances)
+        take_readings(w, world, disturbances, fields(world.senses.percept, model.at))
+        apply_disturbances(
+            w, world, disturbances, fields(world.senses.percept, model.at),
+            disturbance_fields(world.senses.percept, model.at),
+        )  # fmt: skip
 
 
 @compiled_inner
@@ -296,7 +299,10 @@ def step_world(
         if due or control_step_index == control_steps - 1:
             perceive(w, world, model, workspace, grid, due or disturbances is None or disturbances.sonar_timing.ideal)
             if disturbances is not None:
-                take_readings(w, world, model.at, disturbances)
+                take_readings(w, world, disturbances, fields(world.senses.percept, model.at))
     facts.saturated[w] /= max(num_alive * control_steps, 1)
     if disturbances is not None:
-        apply_disturbances(w, world, model.at, disturbances)
+        apply_disturbances(
+            w, world, disturbances, fields(world.senses.percept, model.at),
+            disturbance_fields(world.senses.percept, model.at),
+        )  # fmt: skip

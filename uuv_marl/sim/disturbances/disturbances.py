@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import FIELDS, DisturbanceFields, Starts
+from uuv_marl.percept import FIELDS, DisturbanceFields, Fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.conditions import vehicle_disturbances
 from uuv_marl.sim.arrays import State, World, WorldMap
@@ -45,6 +45,7 @@ from uuv_marl.sim.disturbances.noise import (
 from uuv_marl.sim.disturbances.readings import (
     Detections,
     Readings,
+    any_due,
     begin_line,
     collect,
     line_sizes,
@@ -55,7 +56,6 @@ from uuv_marl.sim.disturbances.readings import (
 from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming, due, sonar_timing
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.tables import allocate
-from uuv_marl.sim.views import disturbance_fields, fields
 from uuv_marl.sim.workspace import Columns
 from uuv_marl.types import UInt64
 
@@ -134,70 +134,61 @@ def disturbance_tables(disturbances: Disturbances | None) -> tuple[Any, ...]:
 
 
 @compiled_inner
-def integrate_disturbed(w: int, state: State, rules: Rules, now: Columns, disturbances: Disturbances) -> None:
+def integrate_disturbed(w: int, state: State, rules: Rules, now: Columns, d: Disturbances) -> None:
     """Move world w by one control step. The forces in the water, ``hull.tau``, are written."""
-    weaken(w, state.tick[w], now, disturbances.actuation, disturbances.hull)
-    integrate_each(w, state.alive, rules, now, disturbances.actuation, disturbances.hull, disturbances.flow.flow)
+    weaken(w, state.tick[w], now, d.actuation, d.hull)
+    integrate_each(w, state.alive, rules, now, d.actuation, d.hull, d.flow.flow)
 
 
 @compiled_inner
-def advance_disturbances(w: int, world: World, disturbances: Disturbances) -> None:
+def advance_disturbances(w: int, world: World, d: Disturbances) -> None:
     """Update the disturbances at the end of a control step, which ``state.tick`` already counts."""
-    key, flow, errors = disturbances.keys[w], disturbances.flow, disturbances.navigation_errors
-    advance_gust(w, key, world.state.tick[w], disturbances.water, flow)
-    read_flow(w, world.state, disturbances.water, flow)
-    drift_position(w, world.state, disturbances.navigation, errors)
-    remember(w, world.state, disturbances.readings)
-    exchange(w, key, world, disturbances.modem, disturbances.messages, flow, errors)
+    advance_gust(w, d.keys[w], world.state.tick[w], d.water, d.flow)
+    read_flow(w, world.state, d.water, d.flow)
+    drift_position(w, world.state, d.navigation, d.navigation_errors)
+    remember(w, world.state, d.readings)
+    exchange(w, d.keys[w], world, d.modem, d.messages, d.flow, d.navigation_errors)
 
 
 @compiled_inner
-def begin_disturbances(w: int, world: World, disturbances: Disturbances) -> None:
+def begin_disturbances(w: int, world: World, d: Disturbances) -> None:
     """Start the disturbances from the present states, after a reset or once states were written by hand."""
-    key, flow, errors = disturbances.keys[w], disturbances.flow, disturbances.navigation_errors
-    read_flow(w, world.state, disturbances.water, flow)
-    errors.position_error[w] = 0.0
-    schedule_outages(w, key, disturbances.noise, disturbances.sensor_errors)
-    begin_line(w, world.state, disturbances.readings)
-    exchange(w, key, world, disturbances.modem, disturbances.messages, flow, errors)
+    read_flow(w, world.state, d.water, d.flow)
+    d.navigation_errors.position_error[w] = 0.0
+    schedule_outages(w, d.keys[w], d.noise, d.sensor_errors)
+    begin_line(w, world.state, d.readings)
+    exchange(w, d.keys[w], world, d.modem, d.messages, d.flow, d.navigation_errors)
 
 
 @compiled_inner
-def reads(w: int, tick: int, disturbances: Disturbances) -> bool:
+def reads(w: int, tick: int, d: Disturbances) -> bool:
     """Whether an array of world w takes a reading at this control step that a decision will use."""
-    timing, is_due = disturbances.sonar_timing, False
-    since = tick - disturbances.readings.began[w]
-    for a in range(0 if timing.ideal else timing.every.shape[0]):
-        is_due = is_due or due(since, timing.every[a], timing.delay, timing.control_steps) >= 0
-    return is_due
+    return any_due(w, tick, d.sonar_timing, d.readings)
 
 
 @compiled_inner
-def take_readings(w: int, world: World, at: Starts, disturbances: Disturbances) -> None:
+def take_readings(w: int, world: World, d: Disturbances, see: Fields) -> None:
     """Store the arrays' readings of this control step, from percepts that hold true values."""
-    tick, timing, noise = world.state.tick[w], disturbances.sonar_timing, disturbances.noise
-    errors, readings, detections = disturbances.sensor_errors, disturbances.readings, disturbances.detections
-    key, see = disturbances.keys[w], fields(world.senses.percept, at)
+    tick, timing = world.state.tick[w], d.sonar_timing
     for a in range(0 if timing.ideal else timing.every.shape[0]):
-        number = due(tick - readings.began[w], timing.every[a], timing.delay, timing.control_steps)
+        number = due(tick - d.readings.began[w], timing.every[a], timing.delay, timing.control_steps)
         if number >= 0:
-            reading = Reading(w, a, number, tick, number % readings.target_index.shape[1])
-            num = collect(reading, world, see, timing, disturbances.navigation_errors, readings, detections)
-            add_errors(reading, num, key, timing.active[a] == timing.active[a + 1], noise, errors, detections)
-            store(reading, num, timing, detections, readings)
+            at = Reading(w, a, number, tick, number % d.readings.target_index.shape[1])
+            num = collect(at, world, see, timing, d.navigation_errors, d.readings, d.detections)
+            passive = timing.active[a] == timing.active[a + 1]
+            add_errors(at, num, d.keys[w], passive, d.noise, d.sensor_errors, d.detections)
+            store(at, num, timing, d.detections, d.readings)
             apply_outages(
-                reading, key, timing, noise, errors, disturbances.actuation, disturbances.hull, detections, readings
+                at, d.keys[w], timing, d.noise, d.sensor_errors, d.actuation, d.hull, d.detections, d.readings
             )
 
 
 @compiled_inner
-def apply_disturbances(w: int, world: World, at: Starts, disturbances: Disturbances) -> None:
+def apply_disturbances(w: int, world: World, d: Disturbances, see: Fields, more: DisturbanceFields) -> None:
     """Turn percepts that hold true values into what vehicles observe; ``detected_index`` is written, too."""
-    timing, errors = disturbances.sonar_timing, disturbances.navigation_errors
-    see, more = fields(world.senses.percept, at), disturbance_fields(world.senses.percept, at)
-    if not timing.ideal:
-        write_readings(w, world, timing, errors, disturbances.readings, see, more)
-    write_ranged(w, world.state.alive, timing, disturbances.noise, more)
-    write_velocities(w, world, disturbances.water, disturbances.flow, see, more)
-    write_messages(w, world, disturbances.messages, errors, more)
-    navigate(w, world, disturbances.navigation, errors, see)
+    if not d.sonar_timing.ideal:
+        write_readings(w, world, d.sonar_timing, d.navigation_errors, d.readings, see, more)
+    write_ranged(w, world.state.alive, d.sonar_timing, d.noise, more)
+    write_velocities(w, world, d.water, d.flow, see, more)
+    write_messages(w, world, d.messages, d.navigation_errors, more)
+    navigate(w, world, d.navigation, d.navigation_errors, see)

@@ -19,7 +19,7 @@ from uuv_marl.scenario import MAX_RANGE_M, Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.disturbances.navigation import NavigationErrors
-from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming, control_step_of, latest, sonar_timing
+from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming, control_step_of, due, latest, sonar_timing
 from uuv_marl.sim.perception import saturate
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.types import Float32, Float64, Int32, Int64
@@ -83,6 +83,15 @@ def line_sizes(scenario: Scenario) -> dict[str, int]:
         "slot": 2 + math.floor(numbers.delay / float(numbers.every.min())),
         "past": math.floor(far) + 2 if far > 0.0 else 0,
     }
+
+
+@compiled_inner
+def any_due(w: int, tick: int, timing: SonarTiming, readings: Readings) -> bool:
+    """Whether an array of world w takes a reading at this control step that a decision will use."""
+    is_due, since = False, tick - readings.began[w]
+    for a in range(0 if timing.ideal else timing.every.shape[0]):
+        is_due = is_due or due(since, timing.every[a], timing.delay, timing.control_steps) >= 0
+    return is_due
 
 
 # --- From true values into the delay line ---
