@@ -186,13 +186,10 @@ def test_the_table_of_policies_is_right():
     needs = {name: need for names, need in rows for name in re.findall(r"`(\w+)`", names)}
     assert set(needs) == set(POLICIES)
     for name, policy in POLICIES.items():
-        by = getattr(policy, "identity", False)
-        told = [f"with `{by}=true` identity"] if isinstance(by, str) else ["identity"] * by
-        parts = [
-            *policy.requirements.channels,
-            *told,
-            *(["yaw damping"] if policy.requirements.yaw_damping_nms else []),
-        ]
+        required = policy.requirements
+        index = required.identity
+        identity = [f"with `{index}=true` identity"] if isinstance(index, str) else ["identity"] * index
+        parts = [*required.channels, *identity, *(["yaw damping"] if required.yaw_damping_nms else [])]
         assert needs[name] == (", ".join(parts) or "nothing"), name
 
 

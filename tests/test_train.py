@@ -723,7 +723,7 @@ def test_a_folder_that_is_used_or_empty_or_of_another_scenario_is_refused(tmp_pa
     with pytest.raises(ResultsError, match="not empty; give --resume"):
         next(train(tmp_path / "a", small()))
     mine.write_text('extends = "starter"\nversion = 1\n[arrival]\ndwell_s = 1.0\n')
-    with pytest.raises(ResultsError, match=r"with arrival.dwell_s = .*, and arrival.dwell_s is 1.0 now; give .* as it"):
+    with pytest.raises(ResultsError, match=r"with arrival.dwell_s = .*, and arrival.dwell_s is 1.0 now; restore .*"):
         next(resume(tmp_path / "a"))
     with pytest.raises(ResultsError, match="holds no training to resume"):
         next(resume(tmp_path / "b"))
@@ -778,7 +778,7 @@ def test_a_first_start_that_was_cut_off_can_be_started_again(tmp_path, no_valida
         next(train(tmp_path / "a", small()))
     said = []
     assert len(list(resume(tmp_path / "a", say=said.append))) == 5
-    assert "holds no checkpoint yet: starting at the beginning" in said[0]
+    assert "holds no checkpoint yet: starting from the beginning" in said[0]
     assert len(rows(tmp_path / "a")) == 5
 
 
@@ -802,7 +802,7 @@ def test_an_incomplete_last_checkpoint_is_named(tmp_path, no_validation):
     for _ in resume(tmp_path / "a"):
         pass
     (own / "000005" / "record.json").unlink()
-    with pytest.raises(ResultsError, match="000005 is incomplete .record.json: No such file.*copy it again"):
+    with pytest.raises(ResultsError, match="000005 is incomplete .record.json: No such file.*copy the whole folder again"):
         next(resume(tmp_path / "a"))
     shutil.copytree(tmp_path / "earlier", own / "000002")
     said = []
@@ -1000,7 +1000,7 @@ def test_the_command_goes_on_with_what_the_folder_holds(tmp_path, no_validation)
     assert f"uuv-marl replay --scenario starter --policy {tmp_path}/best --seed 900000" in done.output
     assert [row["agent_steps"] for row in rows(tmp_path)] == ["168", "336"]
     again = CliRunner().invoke(app, ["train", "--resume", f"--output={tmp_path}"])
-    assert "the whole budget is spent already" in again.output
+    assert "the budget was already spent" in again.output
 
 
 @pytest.mark.parametrize(
