@@ -262,7 +262,7 @@ def test_what_is_no_trace_is_explained(tmp_path):
         (tmp_path / "nothing.npz", "does not exist; give the folder of a benchmark"),
         (foreign, "holds no results.json .* simulate with --scenario and --policy"),
         (stray, "is not the trace of a run in .*results.json"),
-        (path.with_name("lossy.random.1.npz"), "no trajectories: .* seed 0.*: uuv-marl replay .*--policy random --seed 1"),
+        (path.with_name("lossy.random.1.npz"), "no trajectories: .* seed 0.*: uuv-marl .*--policy random --seed 1"),
     ):
         with pytest.raises(ReplayError, match=message):
             from_trace(trace)
@@ -270,7 +270,7 @@ def test_what_is_no_trace_is_explained(tmp_path):
         with pytest.raises(ReplayError, match=message):
             from_folder(tmp_path / "out", "lossy", policy, seed)
     path.write_bytes(path.read_bytes()[:300])
-    with pytest.raises(ResultsError, match="can't be read .*; delete it, and the benchmark's command makes it again"):
+    with pytest.raises(ResultsError, match="can't be read .*; delete it and run the benchmark's command again"):
         from_trace(path)
 
 
