@@ -225,7 +225,7 @@ def test_a_search_is_resumed_and_repeats_itself(tmp_path, monkeypatch):
 @pytest.mark.parametrize("width", [80, 88, 100, 130])
 def test_a_tasks_table_fits_its_width_with_no_letter_cut(width):
     columns = load_scenario("hard_water").task_class.columns
-    headers = ("policy", "class, and beyond sonar", "swarm success", "success", *columns,
+    headers = ("policy", "class, and extra observations", "swarm success", "success", *columns,
                "obstacle distance [m]", "worst", "spacing [m]", "worst", "collisions")  # fmt: skip
     row = ("mine:Dodge", "end to end", "3/5", "86.0%", "1.17 [1.09, 1.30]", "4.63 [3.9, 5.15]", "1.26",
            "7.31 [6.77, 8.02]", "3.46", "13 in 3 seeds")  # fmt: skip

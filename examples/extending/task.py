@@ -1,4 +1,7 @@
-"""A task of your own: gather by sonar. In this folder: ``uuv-marl benchmark --set task=task:Rendezvous``."""
+"""A task of your own: gather by sonar.
+
+In this folder: ``uuv-marl benchmark --scenario starter --policy random --set task=task:Rendezvous``.
+"""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar

@@ -141,7 +141,7 @@ def _competitors(groups: Groups, task: str) -> list[str]:
 
 
 def _called(competitor: str) -> str:
-    """Name of a competitor, for a policy of the package with its requirements beyond sonar."""
+    """Name of a competitor, for a policy of the package with its extra observations."""
     return competitor if competitor in LEARNERS or competitor.endswith("(checked)") else named(competitor)
 
 

@@ -82,6 +82,8 @@ def make_policy(
         PolicyError: the name or a parameter is unknown, or the target lacks what the policy requires
             (``with_policy_requirements``).
     """
+    if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise PolicyError(f"a policy is given by its name, such as 'scout' or 'module:Class', got {name!r}")
     if isinstance(target, Scenario):
         return _made(name, target, num_worlds, parameters)
     scenario, swarm, agents = environment(target, name)

@@ -1,4 +1,4 @@
-"""Requirements of policies beyond sonar and navigation, and their check against a scenario."""
+"""What a policy requires of a scenario: extra observations, yaw damping and decision period; and the check."""
 
 import math
 from collections.abc import Sequence

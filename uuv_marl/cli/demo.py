@@ -19,7 +19,7 @@ def demo(
         from uuv_marl.replay.demo import POLICIES, SCENARIO, SEED, write_demo
 
         write_demo(output)
-        say(f"Recorded replay: {output} ({output.stat().st_size / 1000:,.0f} kB)")
+        say(f"Recorded replay, to open in a browser: {output} ({output.stat().st_size / 1000:,.0f} kB)")
         if sys.stdout.isatty():
             webbrowser.open(output.resolve().as_uri())
         policies = " ".join(f"--policy {policy}" for policy in POLICIES)

@@ -83,7 +83,7 @@ def _policies() -> Table:
     from uuv_marl.baselines import POLICIES
     from uuv_marl.baselines.making import policy_requirements
 
-    table = Table("name", "beyond sonar", "yaw damping [N m s]", "decides every [s]", "what")
+    table = Table("name", "extra observations", "yaw damping [N m s]", "decision period [s]", "what")
     for name, policy_type in POLICIES.items():
         required = policy_requirements(name)
         every = f"{required.decision_period_s:g}" if required.decision_period_s else "-"
