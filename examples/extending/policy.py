@@ -1,4 +1,7 @@
-"""A policy of your own, with a memory. In this folder: ``uuv-marl benchmark --scenario starter --policy policy:Smooth``."""
+"""A policy of your own, with a memory.
+
+In this folder: ``uuv-marl benchmark --scenario starter --policy policy:Smooth``.
+"""
 
 from typing import Annotated, Any, ClassVar, NamedTuple
 

@@ -20,7 +20,7 @@ NOTHING = "–"
 _NARROW = 110
 """Columns of a terminal below which its table omits intervals and the time mean."""
 HEADERS = (
-    "policy", "class, extra observations", "arrived", "task time [s]", "worst", "obstacle distance [m]", "worst",
+    "policy", "class, and extra observations", "arrived", "task time [s]", "worst", "obstacle distance [m]", "worst",
     "spacing [m]", "worst", "mean spacing [m]", "within Eq. 7", "collisions", "paper",
 )  # fmt: skip
 CAPTION = (
@@ -76,7 +76,7 @@ def scenario_table(results: Results, scenario: Scenario, policies: Sequence[str]
     if issubclass(task, Follow):
         return Table(title(scenario, seeds), HEADERS, rows, CAPTION)
     headers = (
-        "policy", "class, extra observations", "swarm success", "success", *task.columns,
+        "policy", "class, and extra observations", "swarm success", "success", *task.columns,
         "obstacle distance [m]", "worst", "spacing [m]", "worst", "collisions",
     )  # fmt: skip
     task_rows = [_task_cells(cells, runs[cells.policy], task.columns) for cells in rows]

@@ -43,7 +43,7 @@ def from_terms(owner: str, names: Sequence[str], give: Callable[[], Terms], swar
     def fill(_begin: int, _end: int) -> None:
         given = give()
         if not isinstance(given, Mapping):
-            raise RewardError(f"reward of {owner} must return a dictionary of terms by name, got {type(given).__name__}")
+            raise RewardError(f"reward of {owner} must return a dictionary of its terms, got {type(given).__name__}")
         if {*given} != {*names}:
             raise RewardError(
                 f"reward of {owner} must give the terms {', '.join(names) or 'none'}, got {', '.join(given)}; "
