@@ -40,7 +40,7 @@ def test_a_scene_is_the_sample_of_its_time(starter):
     assert len(scene.trail) == TRAIL_S
     np.testing.assert_array_equal(scene.trail[0], recording.position[k - 200])
     np.testing.assert_array_equal(scene.trail[-1], recording.position[k - 10])
-    heard = recording.inspections[1].heard[k]
+    heard = recording.inspections[1].detected_index[k]
     assert len(scene.sonar.neighbour) == (heard >= 0).sum() > 0
     assert scene.arrival_s is None
     assert scenes.at(1e6).arrival_s == recording.metrics["task_time_s"]

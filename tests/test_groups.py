@@ -55,7 +55,7 @@ def test_groups_that_swap_sides_have_colours_of_their_own_and_so_have_their_goal
     picture, camera = painted(swap)
     team = swap.groups.team
     assert np.bincount(team).tolist() == [20, 20]
-    assert not swap.leads
+    assert not swap.followed_paths
     assert len({*ink.TEAMS.values()}) == len(ink.TEAMS) == 4
     for own in (0, 1):
         at = camera.pixels(swap.position[team == own])

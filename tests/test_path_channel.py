@@ -32,7 +32,7 @@ def flown(scenario, worlds, decisions):
     ("kind", "vehicles"), [*((kind, 10) for kind in KINDS), ("gate", 54), ("forest", 54), ("harbour", 54)]
 )
 def test_the_oracle_passes_every_kind_of_map_and_touches_nothing(kind, vehicles):
-    runs = episodes(told([kind], vehicles), "oracle", range(FIRST, FIRST + 4))
+    runs = [*episodes(told([kind], vehicles), "oracle", range(FIRST, FIRST + 4))]
     assert np.mean([run.metrics["task"]["success_share"] for run in runs]) >= 0.95
     assert max(run.metrics["task"]["time_ratio"] for run in runs) < 2.0
 
@@ -67,7 +67,7 @@ def test_what_the_channel_tells_is_true(decisions):
 def test_without_the_channel_nothing_is_added_and_nothing_changes():
     plain, swarm = (Swarm(load_scenario(told(), overrides={"sonar.channels": have}), 3) for have in ([], ["path"]))
     assert plain.task.memory.path_cost.size == 0
-    assert plain.told == ()
+    assert plain.task_fields == ()
     assert swarm.layout.table[: len(plain.layout.table)] == plain.layout.table
     assert [field.name for field in swarm.task_fields] == ["path", "path_length", "path_walls"]
     action = np.full((3, 10, 2), 0.5)
@@ -75,20 +75,20 @@ def test_without_the_channel_nothing_is_added_and_nothing_changes():
         each.reset(FIRST)
         each.step(action)
     np.testing.assert_array_equal(swarm.percept.flat[:, :, : plain.layout.size], plain.percept.flat)
-    with pytest.raises(KeyError, match="percept has no field 'way'"):
+    with pytest.raises(KeyError, match="percept has no field 'path'"):
         plain.percept["path"]
 
 
 def test_a_channel_that_the_task_lacks_is_refused_with_the_remedy():
     message = (
-        "sonar.channels can't hold 'way' with task 'follow', whose channels are compass, .*, modem; "
+        "sonar.channels can't hold 'path' with task 'follow', whose channels are compass, .*, modem; "
         "task 'hard_water' has it"
     )
     with pytest.raises(ScenarioError, match=message):
         load_scenario("starter", overrides={"sonar.channels": ["path"]})
     with pytest.raises(ScenarioError, match=message):
         with_policy_requirements("oracle", load_scenario("starter"))
-    with pytest.raises(ScenarioError, match="can't hold 'wya' with task 'hard_water', whose channels are .*, way$"):
+    with pytest.raises(ScenarioError, match="can't hold 'wya' with task 'hard_water', whose channels are .*, path$"):
         load_scenario("hard_water", overrides={"sonar.channels": ["wya"]})
     for name in ("starter", "hard_water"):
         with pytest.raises(PolicyError, match="Oracle needs the channels way and link"):
@@ -116,5 +116,5 @@ def test_geodesic_progress_is_what_the_way_has_shortened_by():
         for term in ("obstacle", "spacing", "effort", "collision", "arrival"):
             np.testing.assert_array_equal(result.terms[term], usual.terms[term])
     np.testing.assert_allclose(total, (before - knowing.task.path_lengths()) / plain.reward.progress_m, atol=1e-9)
-    with pytest.raises(ValueError, match="rewards of task 'follow'"):
+    with pytest.raises(ValueError, match="choose one of task 'follow'"):
         BatchedEnv(load_scenario("starter"), 1, "geodesic")

@@ -112,7 +112,7 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
     result = CliRunner().invoke(app, [*args.split(), str(tmp_path)])
     assert result.exit_code == 0, result.output
     text = (tmp_path / "robustness.md").read_text()
-    assert "| A1 | lag of the actuators |" in text
+    assert "| A1 | actuator lag |" in text
     assert "| C1 |" not in text, "it uses neither link nor modem"
     assert "still water, no noise, no delay" in text
     rows = job.read_episodes(tmp_path / "episodes.csv")

@@ -208,7 +208,7 @@ def test_every_gain_of_the_search_can_be_given_by_name_and_counts():
 
 
 def test_the_search_refuses_what_has_no_box():
-    with pytest.raises(PolicyError, match="searches a box, of which task 'follow' tells nothing; run it on silent"):
+    with pytest.raises(PolicyError, match="searches a box, which task 'follow' does not have; run it on silent"):
         make_policy("nearest_target", with_policy_requirements("nearest_target", load_scenario("starter")))
 
 

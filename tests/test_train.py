@@ -619,7 +619,7 @@ def test_a_finished_training_goes_on_to_more_steps_as_it_ended(tmp_path, no_vali
 def test_a_training_of_minutes_ends_by_processor_time(tmp_path, no_validation):
     records = list(train(tmp_path, small(steps=None, minutes=0.005)))
     assert records[-2].seconds < 0.3 <= records[-1].seconds
-    assert records[-1].whole is not None
+    assert records[-1].swarm_success is not None
     with pytest.raises(TrainingError, match="has a budget of minutes; give --minutes, not --steps"):
         TrainingFolder(tmp_path, None).budget_with(None, 100)
     assert TrainingFolder(tmp_path, None).budget_with(2.0, None) == 120.0
@@ -662,7 +662,7 @@ def test_the_best_policy_is_kept_with_its_worst_episode(tmp_path, monkeypatch):
     assert [record.best for record in records] == [0.35, 0.5, 0.5, 0.5]
     assert load_checkpoint(tmp_path / "a" / "best").card.training["record"]["iteration"] == 4
     best, command = trainings.best_of(tmp_path / "a")
-    assert (best.iteration, best.whole) == (4, 0.5)
+    assert (best.iteration, best.swarm_success) == (4, 0.5)
     assert command.startswith(f"uuv-marl replay --scenario starter --policy {tmp_path}/a/best --seed 900004 --set ")
     assert "--set time_limit.extra_s=6.0" in command
     assert "--set swarm.num_vehicles=6" in command
@@ -702,11 +702,11 @@ def test_a_folder_says_why_it_can_not_go_on_here_and_what_made_it_so_far(tmp_pat
 
 @pytest.mark.parametrize("law", ["mappo", "mine:Law", "./runs/best"])
 def test_a_network_is_around_a_law_that_ships(law, tmp_path):
-    with pytest.raises(PolicyError, match=f"around one of the laws bio_inspired, .*, got '{law}'"):
+    with pytest.raises(PolicyError, match=f"base_controller must be one of bio_inspired, .*, got '{law}'"):
         Training(base_controller=law)
     card = card_for(load_scenario("starter")).model_copy(update={"base_controller": law})
     save_checkpoint(tmp_path / WEIGHTS_FILE, card, tensors(card))
-    with pytest.raises(PolicyError, match="around one of the laws"):
+    with pytest.raises(PolicyError, match="base_controller must be one of"):
         make_policy(str(tmp_path), load_scenario("starter"))
 
 

@@ -1,7 +1,4 @@
-"""A task of your own: gather by sonar.
-
-In this folder: ``uuv-marl benchmark --scenario starter --policy random --set task=task:Rendezvous``.
-"""
+"""Gather by sonar, a task of your own: ``uuv-marl benchmark --scenario starter --set task=task:Rendezvous``."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -25,9 +22,7 @@ class Rendezvous(Task):
         near_m: Positive = 10.0
 
     observed: ClassVar[tuple[PerceptField, ...]] = (PerceptField("near", (1,), FLAG, "1 within near_m of the centre"),)
-    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "dense": {"away": "-0.01/m for each decision", "collision": "-10 for each"}
-    }
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {"away": "-0.01/m", "collision": "-10 for each"}}
     columns: ClassVar[Mapping[str, str]] = {"spread_m": "mean distance from the centre at the end [m]"}
 
     def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
