@@ -256,6 +256,15 @@ def test_a_preset_is_a_set_of_numbers_of_which_each_can_still_be_given():
         assert make_policy("scout", scenario, preset=name).gains == preset.gains
 
 
+def test_a_remedy_is_one_that_helps():
+    fixed = load_scenario("random_field", overrides={"timing.fixed": True})
+    with pytest.raises(PolicyError, match="add own_clock=true to the policy's name"):
+        make_policy("mappo", with_policy_requirements("mappo", fixed))
+    make_policy("mappo,own_clock=true", with_policy_requirements("mappo,own_clock=true", fixed))
+    with pytest.raises(PolicyError, match="override these fields$"):
+        make_policy("sdc", fixed)
+
+
 class Nothing(Policy):
     """Decides nothing."""
 

@@ -64,9 +64,9 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
         try:
             lock.acquire(timeout=wait_s)
         except Timeout:
-            opener = owner.read_text(encoding="utf-8") if owner.exists() else "another command"
+            holder = owner.read_text(encoding="utf-8") if owner.exists() else "another command"
             raise ResultsError(
-                f"{folder} is in use by {opener}; wait until it has ended, or give another --output"
+                f"{folder} is in use by {holder}; wait until it has ended, or give another --output"
             ) from None
     try:
         since = time.strftime("%Y-%m-%d %H:%M:%S")
@@ -75,6 +75,6 @@ def locked(folder: Path, wait_s: float = 0.0) -> Iterator[None]:
     finally:
         owner.unlink(missing_ok=True)
         lock.release()
-        if is_new and {path.name for path in folder.iterdir()} <= {_LOCK}:  # the block failed before it wrote anything
+        if is_new and {path.name for path in folder.iterdir()} <= {_LOCK}:  # it failed before it wrote anything
             (folder / _LOCK).unlink(missing_ok=True)
             folder.rmdir()

@@ -229,7 +229,7 @@ class Percept:
         """View of a field, shape (..., *axes). Raises KeyError where it or its channel is absent."""
         if name not in self.layout.starts:
             near = hint(str(name), self.names, 0.6)
-            raise KeyError(f"percept has no field {name!r}; {near}It has {', '.join(self.names)}")
+            raise KeyError(f"percept has no field {name!r}; {near}it has {', '.join(self.names)}")
         start, field = self.layout.starts[name], next(field for field in self.layout.table if field.name == name)
         return self.flat[..., start : start + field.size].reshape(*self.flat.shape[:-1], *field.shape)
 

@@ -8,7 +8,7 @@ from uuv_marl.sim.swarm import Swarm
 
 
 def close_and_careful(swarm: Swarm) -> NDArray[np.float64]:
-    """Cost of the distance to the reference point, of nearness and of collisions, shape (world, vehicle).
+    """Negative cost of distance to the reference point, nearness and collisions, shape (world, vehicle).
 
     ``swarm.state`` and ``swarm.facts`` hold the arrays; ``help(uuv_marl.sim.arrays.Facts)`` explains each.
     """

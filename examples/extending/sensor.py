@@ -14,12 +14,12 @@ from uuv_marl.scenario import Scenario
 
 def turned(percept: Percept, angle: float) -> Percept:
     """The percept with bearings that are off by this angle, positive to starboard [rad]."""
-    known = dataclasses.replace(percept, flat=percept.flat.copy())
+    changed = dataclasses.replace(percept, flat=percept.flat.copy())
     c, s = math.cos(angle), math.sin(angle)
-    for name in ("neighbour", "echo_position"):  # help(uuv_marl.percept.Percept) lists the fields
+    for name in ("neighbour", "echo_position"):  # uuv_marl.percept.FIELDS lists the fields
         x, y = np.moveaxis(percept[name], -1, 0)
-        known[name][...] = np.stack([c * x - s * y, s * x + c * y], axis=-1)
-    return known
+        changed[name][...] = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    return changed
 
 
 class Askew(BioInspiredPlus):

@@ -68,7 +68,7 @@ def shared(*_: Any, **__: Any) -> str:
 
 
 def train(algorithm: Any, steps: int, output: Path) -> None:
-    """Train for so many agent-steps, and keep a checkpoint after every iteration."""
+    """Train for a number of agent-steps, and write a checkpoint after every iteration."""
     done = 0
     while done < steps:
         sampled = algorithm.train()["env_runners"]
@@ -78,15 +78,15 @@ def train(algorithm: Any, steps: int, output: Path) -> None:
 
 
 def main() -> None:
-    """Train as the command line says."""
+    """Train with the options of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenario", default="starter", help="name or TOML file; training_field is the next")
-    parser.add_argument("--vehicles", type=int, help="those of the scenario unless given")
+    parser.add_argument("--vehicles", type=int, help="size of the swarm; by default the scenario's")
     parser.add_argument("--steps", type=int, default=1_000_000, help="decisions times vehicles")
     parser.add_argument("--runners", type=int, default=2, help="processes that sample, a core each")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", type=user_path, default=Path("runs/rllib"), help="folder of the checkpoint")
-    parser.add_argument("--resume", action="store_true", help="go on from the checkpoint")
+    parser.add_argument("--resume", action="store_true", help="continue from the checkpoint")
     arguments = parser.parse_args()
     start_ray(arguments.runners)
     config = ppo_config(arguments.scenario, arguments.vehicles, arguments.runners, TRAINING_SEEDS + arguments.seed)

@@ -155,7 +155,7 @@ def _gain(name: str, key: str, value: object, gains: Any, known: Sequence[str]) 
     if key not in fields:
         names = [*known, *fields]
         raise PolicyError(
-            f"policy {name!r} has no parameter {key!r}; {hint(key, names, 0.6)}It has {', '.join(names) or 'none'}"
+            f"policy {name!r} has no parameter {key!r}; {hint(key, names, 0.6)}it has {', '.join(names) or 'none'}"
         )
     value = plain(value)
     if not (isinstance(value, float | int) and math.isfinite(value)):

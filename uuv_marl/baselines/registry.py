@@ -71,7 +71,7 @@ def policy_class(name: str) -> PolicyType:
         return _imported(plain)
     if plain not in POLICIES:
         raise PolicyError(
-            f"policy {plain!r} is unknown; {hint(plain, POLICIES)}There are {', '.join(POLICIES)}, module:Class for "
+            f"policy {plain!r} is unknown; {hint(plain, POLICIES)}there are {', '.join(POLICIES)}, module:Class for "
             "your own, and paths of checkpoints"
         )
     return POLICIES[plain]

@@ -60,11 +60,12 @@ def check_requirements(name: str, required: PolicyRequirements, scenario: Scenar
     if not scenario.timing.fixed and not math.isclose(scenario.actuators.yaw_damping_nms, damping, rel_tol=1e-9):
         needs.append(f"a yaw damping of {damping:g} N m s (actuators.yaw_damping_nms)")
     period = required.decision_period_s
-    if period and not math.isclose(scenario.timing.decision_period_s, period, rel_tol=1e-9):
+    late = period and not math.isclose(scenario.timing.decision_period_s, period, rel_tol=1e-9)
+    if late:
         needs.append(f"a decision every {period:g} s (timing.decision_period_s)")
     if needs:
-        own = f", or run it as {name},own_clock=true" if scenario.timing.fixed else ""
+        own = " (add own_clock=true to the policy's name)" if late and scenario.timing.fixed else ""
         raise PolicyError(
             f"{name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
-            f"use uuv_marl.baselines.with_policy_requirements(policy, scenario), or override these fields{own}"
+            f"use uuv_marl.baselines.with_policy_requirements(policy, scenario){own}, or override these fields"
         )

@@ -56,7 +56,7 @@ def task_class(name: str) -> Any:
     tasks = shipped_tasks()
     if name not in tasks and ":" not in name:
         raise ScenarioError(
-            f"task {name!r} is unknown; {hint(name, tasks)}There are {', '.join(tasks)}, and module:Class for your own"
+            f"task {name!r} is unknown; {hint(name, tasks)}there are {', '.join(tasks)}, and module:Class for your own"
         )
     try:
         task_type = named_object(tasks.get(name, name))

@@ -112,9 +112,9 @@ class Network:
         ops = self._ops
         own = ops.dense(state, self._tensors["gru.state_weight"], self._tensors["gru.state_bias"])
         (r, k, n), (own_r, own_k, own_n) = ops.parts(gates), ops.parts(own)
-        weighted_state = ops.sigmoid(k + own_k)
+        update = ops.sigmoid(k + own_k)
         new = ops.tanh(n + ops.sigmoid(r + own_r) * own_n)
-        return new + weighted_state * (state - new)
+        return new + update * (state - new)
 
     def output(self, z: Any, state: Any = None) -> Any:
         """The action before its bounds, shape (row, 2), from features and the recurrent layer's state, if any."""

@@ -44,7 +44,7 @@ class Barrier(NamedTuple):
 
 MOST_CLOSED = 0.3  # largest share of the remaining distance that is closed in a decision period [1]
 GUARD = Barrier(obstacle_m=6.0, obstacle_rate=2.0)
-"""The filter of ``safety_filter=true``, with smaller margins than a controller that avoids obstacles early."""
+"""The filter of ``safety_filter=true``, with smaller margins than those of a controller that avoids obstacles early."""
 
 
 def with_numbers(values: Mapping[str, float], gains: G, barrier: Barrier) -> tuple[G, Barrier]:

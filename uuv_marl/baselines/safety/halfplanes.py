@@ -39,12 +39,12 @@ def nearest_velocity(
         The velocity (v_x, v_y) [m/s], and the largest violation [m/s], 0 where every plane is satisfied to
             ``TOLERANCE``.
     """
-    v_x, v_y, violated = _program(w_x, w_y, False, planes, num, -1, firm, 0.0, limit)
-    if violated == num:
+    v_x, v_y, satisfied = _program(w_x, w_y, False, planes, num, -1, firm, 0.0, limit)
+    if satisfied == num:
         return v_x, v_y, 0.0
-    firm = firm if violated >= firm else 0
+    firm = firm if satisfied >= firm else 0
     worst = 0.0
-    for i in range(max(violated, firm), num):
+    for i in range(max(satisfied, firm), num):
         if _excess(v_x, v_y, planes, i) > worst:
             to_x, to_y, done = _program(-planes[i, 0], -planes[i, 1], True, planes, i, i, firm, 0.0, limit)
             if done == i:  # else by rounding alone: the velocity before is as good
@@ -93,8 +93,8 @@ def _program(
     size = math.sqrt(c_x * c_x + c_y * c_y)
     v_x, v_y = (limit * c_x / size, limit * c_y / size) if (far or size > limit) and size > 0.0 else (c_x, c_y)
     for i in range(num):
-        n_x, n_y, b, offset = _row(planes, i, rival, firm, slack)
-        if offset and n_x * v_x + n_y * v_y > b + TOLERANCE:
+        n_x, n_y, b, exists = _row(planes, i, rival, firm, slack)
+        if exists and n_x * v_x + n_y * v_y > b + TOLERANCE:
             t, feasible = _along_border(c_x, c_y, far, planes, i, rival, firm, slack, limit)
             if not feasible:
                 return v_x, v_y, i
@@ -117,8 +117,8 @@ def _along_border(
     high = math.sqrt(limit * limit - b * b)
     low = -high
     for j in range(i):
-        m_x, m_y, a, offset = _row(planes, j, rival, firm, slack)
-        if not offset:
+        m_x, m_y, a, exists = _row(planes, j, rival, firm, slack)
+        if not exists:
             continue
         along, over = m_y * n_x - m_x * n_y, b * (m_x * n_x + m_y * n_y) - a
         if abs(along) <= _PARALLEL:

@@ -44,15 +44,12 @@ class Carrot(Scout):
 
     def with_carrot(self, percept: Percept) -> Percept:
         """The percept with the carrot in place of a goal at rest."""
-        with_carrot, (to, left) = (
-            dataclasses.replace(percept, flat=percept.flat.copy()),
-            self._goal_and_distance(percept),
-        )
+        changed, (to, left) = dataclasses.replace(percept, flat=percept.flat.copy()), self._goal_and_distance(percept)
         far = (left > self.ahead_m) & (percept["reference_velocity"] == 0.0).all(axis=-1)
         to += np.float32(self.right_m) * _unit(np.stack([-to[..., 1], to[..., 0]], axis=-1))
         along = _unit(to)[far]
-        with_carrot["reference"][far], with_carrot["reference_velocity"][far] = self.ahead_m * along, self.speed * along
-        return with_carrot
+        changed["reference"][far], changed["reference_velocity"][far] = self.ahead_m * along, self.speed * along
+        return changed
 
     def _goal_and_distance(self, percept: Percept) -> tuple[Float32, Float32]:
         """Vector to the target point [m], shape (world, vehicle, 2), and distance of the goal [m], (world, vehicle)."""
@@ -78,11 +75,11 @@ class CarrotInformed(Carrot):
 
     def with_carrot(self, percept: Percept) -> Percept:
         """The percept with the carrot on the path; a vehicle that waits has a reference at rest at its position."""
-        with_carrot = super().with_carrot(percept)
+        changed = super().with_carrot(percept)
         if self.waits:
             stays = percept["right_of_way"][..., 0] == 0.0
-            with_carrot["reference"][stays] = with_carrot["reference_velocity"][stays] = 0.0
-        return with_carrot
+            changed["reference"][stays] = changed["reference_velocity"][stays] = 0.0
+        return changed
 
     def _goal_and_distance(self, percept: Percept) -> tuple[Float32, Float32]:
         return percept["path"].copy(), percept["path_length"][..., 0]
