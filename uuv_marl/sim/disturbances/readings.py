@@ -60,7 +60,7 @@ class Detections(NamedTuple):
     code: Annotated[Int64, "world hit", "Index of the listener, shifted left by ``SHIFT``, plus the place."]
     target_index: Annotated[Int64, "world hit", "As in ``Readings``."]
     reach: Annotated[Float64, "world hit", "Range [m], negative if missed."]
-    x: Annotated[Float64, "world hit", "Distance ahead of its position [m]."]
+    x: Annotated[Float64, "world hit", "Distance ahead [m]."]
     y: Annotated[Float64, "world hit", "Distance to starboard [m]."]
     first: Annotated[Float64, "world hit", "Buffer for random numbers."]
     second: Annotated[Float64, "world hit", "Buffer for random numbers."]
@@ -222,7 +222,7 @@ def write_readings(
 def write_vehicle_readings(
     at: Reading, i: int, move: Move, timing: SonarTiming, readings: Readings, detected_index: Int32, see: Fields
 ) -> None:
-    """Write the vehicles that vehicle i detected in a reading into its percept, with the link their identities.
+    """Write the vehicles that vehicle i detected in a reading into its percept; for the link also their identities.
 
     A reading whose number is below 0 holds no detection.
     """
