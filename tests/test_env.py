@@ -1,6 +1,7 @@
 """The PettingZoo environments: conformance, contract, determinism, errors."""
 
 import warnings
+from dataclasses import dataclass
 
 import gymnasium
 import numpy as np
@@ -90,6 +91,16 @@ def test_observations_are_within_finite_bounds_and_lose_nothing():
         observations, *_ = env.step({a: rng.uniform(-1, 1, 2).astype(np.float32) for a in env.agents})
 
 
+@dataclass
+class Spacing:
+    """A user's reward with a setting; a dataclass has no hash."""
+
+    weight: float
+
+    def __call__(self, swarm):
+        return -self.weight * swarm.facts.spacing
+
+
 def test_bad_input_names_the_agent_and_the_remedy():
     env = uuv_marl.parallel_env(num_vehicles=3)
     for call in (env.state, uuv_marl.parallel_env(render_mode="rgb_array").render):
@@ -108,7 +119,9 @@ def test_bad_input_names_the_agent_and_the_remedy():
     ):
         with pytest.raises(ValueError, match=message):
             uuv_marl.parallel_env(**told)
-    lone = uuv_marl.parallel_env(num_vehicles=1, reward=lambda swarm: -swarm.facts.spacing)
+    with pytest.raises(ValueError, match="max_cycles must be a whole number from 1, got 0"):
+        env.max_cycles = 0
+    lone = uuv_marl.parallel_env(num_vehicles=1, reward=Spacing(1.0))
     lone.reset(seed=0)
     with pytest.raises(ValueError, match="must hold finite numbers"):
         lone.step({"uuv_0": np.zeros(2)})

@@ -377,6 +377,7 @@ def test_a_spec_with_a_scenario_goes_through_json():
         ("core:make_batched_env", (2, "starter"), "scenario must be .*; .* is scenario, the second num_worlds"),
         ("sb3:SwarmVecEnv", (2, "starter"), "scenario must be .*, got 2; .* is scenario, the second num_worlds"),
         ("sb3:SwarmVecEnv", ("starter", "2"), "num_worlds must be .*, got '2'; .* is scenario, the second num_worlds"),
+        ("solo:SoloEnv", (2, "starter"), "scenario must be .*, got 2; .* is scenario, the second others"),
         ("torchrl:SwarmEnv", ("starter", 4), "scenario must be .*, got 4; .* is num_worlds, the second scenario"),
     ],
 )

@@ -73,7 +73,7 @@ class BatchedEnv:
                 f"reward must be {', '.join(map(repr, names))} or a function of the swarm, got {reward!r}; "
                 f"choose one of task {scenario.task.name!r}"
             )
-        if reward in self.task.rewards:
+        if not callable(reward) and reward != "team":
             self.task.reward_name = str(reward)
         self.state_layout = state_layout(scenario)
         self._waiting = set(range(num_worlds))

@@ -21,11 +21,11 @@ def ending(batch: BatchedEnv, world: int, vehicle: int | None = None) -> dict[st
         vehicle: index of the vehicle; None for the world as a whole.
 
     Returns:
-        ``is_success`` (in ``follow`` the swarm arrived and this vehicle, or any, was not lost; in other tasks this
-        vehicle, or all, are at the goal and collision-free), ``ending`` (``arrival`` in ``follow``, ``done`` in other
-        tasks, ``time_limit``, also after an arrival if ``arrival.ends_episode`` is false, ``lost``: this vehicle or
-        all, ``diverged``: the integration step is too long, or ``running``), ``arrived`` (the swarm has arrived, or the
-        task is done), ``time_s`` since the reset, and ``collisions``, those of the whole swarm so far.
+        ``is_success`` (``Task.success`` of what is not lost: in ``follow`` the swarm arrived, in most other tasks this
+        vehicle, or all, are at the goal and collision-free), ``ending`` (``arrival`` in ``follow``, ``done`` in
+        other tasks, ``time_limit``, also after an arrival if ``arrival.ends_episode`` is false, ``lost``: this vehicle
+        or all, ``diverged``: the integration step is too long, or ``running``), ``arrived`` (the swarm has arrived, or
+        the task is done), ``time_s`` since the reset, and ``collisions``, those of the whole swarm so far.
     """
     swarm, task = batch.swarm, batch.task
     done, arrived = bool(task.done()[world]), task.arrived(world)

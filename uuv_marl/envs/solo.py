@@ -22,8 +22,8 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
 ):
     """The learner is vehicle 0 and acts by ``step``; all others run the policy ``others``.
 
-    Observation, action and reward are those of one agent of ``parallel_env``. The episode terminates when the swarm
-    arrives or the learner is lost, and is truncated by the time limit; others may be lost before. Every info holds the
+    Observation, action and reward are those of one agent of ``parallel_env``. The episode terminates when the task
+    is done or the learner is lost, and is truncated by the time limit; others may be lost before. Every info holds the
     state of the episode (``uuv_marl.envs.ending.ending``), so that a wrapper may end it.
 
     Args:
@@ -56,7 +56,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         if "for_policy" in options:
             raise TypeError(f"SoloEnv takes no for_policy: the scenario suits others={others!r}; leave it out")
         options["for_policy"] = others
-        batch = make_batched_env(scenario, keep_terms=info_terms, **options)
+        batch = make_batched_env(scenario, order=("scenario", "others"), keep_terms=info_terms, **options)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make_policy(others, self.scenario)
         self._info_terms = info_terms

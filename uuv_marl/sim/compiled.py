@@ -165,8 +165,8 @@ def _announce(place: Cache) -> None:
     """Log that compiling takes long, and delete unused code meanwhile."""
     global _last_compiled  # noqa: PLW0603 - a clock of this process
     if time.monotonic() - _last_compiled > _QUIET_S:
-        remaining = "is kept in %s" if place.writable else "can't be kept, since %s can't be written to"
-        _log.warning(f"Compiling a part of uuv_marl: this takes up to a minute, and {remaining}.", place.folder)
+        outcome = "is kept in %s" if place.writable else "can't be kept, since %s can't be written to"
+        _log.warning(f"Compiling a part of uuv_marl: this takes up to a minute, and {outcome}.", place.folder)
         if place.writable:
             prune(place.folder.parent)
     _last_compiled = time.monotonic()

@@ -52,7 +52,7 @@ def locate(num: int, points: Points, pose: Pose, bins: int, listener: Listener) 
 
 @compiled_inline
 def choose_sectors(num: int, layer: int, suite: SonarSuite, listener: Listener) -> None:
-    """Find the sub-sector of each located point in a layer, a row of ``suite.codes``; their number is none. Eq. 12-13.
+    """Find each located point's sub-sector in a layer, a row of ``suite.codes``; outside all, their number. Eq. 12-13.
 
     No branch depends on the positions, since a mispredicted branch costs more than the arithmetic here.
     """

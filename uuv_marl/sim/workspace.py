@@ -74,7 +74,7 @@ class Obstacles(NamedTuple):
     y: Annotated[Float64, "obstacle", "Centre, east [m]."]
     radius: Annotated[Float64, "obstacle", "Radius [m]."]
     squared: Annotated[Float64, "obstacle", "Squared distance of the nearest vehicle from the centre [m2]."]
-    ahead: Annotated[Float64, "obstacle", "Distance of those chosen ahead of a vehicle [m]."]
+    ahead: Annotated[Float64, "obstacle", "Distance ahead of a vehicle, of those chosen [m]."]
     abeam: Annotated[Float64, "obstacle", "Distance to starboard [m]."]
     gap: Annotated[Float64, "obstacle", "Distance of their surfaces [m]."]
     from_x: Annotated[Float64, "obstacle", "Position of each vehicle when those near it were chosen: north [m]."]

@@ -54,4 +54,4 @@ MEASURED = frozenset({
     "scenario", "policy", "seed", "trace", "task", *Measures.__annotations__, *Success.__annotations__,
     *(f"constraint_share_{name}" for name in Shares.__annotations__),
 })  # fmt: skip
-"""Names of what a run has besides, as a column or in ``results.json``."""
+"""Names that a run has as a column or in ``results.json``, which a task's own columns can't have."""

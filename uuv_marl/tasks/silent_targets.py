@@ -25,7 +25,7 @@ from uuv_marl.tasks.reward import Terms
 from uuv_marl.types import Bool, Float64, Int64
 
 LEAD_S = 2.0
-"""The channel ``path`` leads to a target's position so much later [s]. Assumed, tried by hand with ``oracle``."""
+"""The channel ``path`` leads to where a target will be after this time [s]. Assumed, tried by hand with ``oracle``."""
 
 
 class SilentTargetsNumbers(Section):

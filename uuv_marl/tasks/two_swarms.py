@@ -24,7 +24,7 @@ from uuv_marl.types import Bool, Float64, Int64
 
 _BEFORE_M = 5.0
 """Distance from the wall's surface at which a path turns to the gap [m]."""
-_TURN = PerceptField(
+_RIGHT_OF_WAY = PerceptField(
     "right_of_way", (1,), FLAG, "1 if the group that goes first has passed, or for its vehicles; else 0"
 )
 
@@ -93,7 +93,7 @@ class TwoSwarms(Reach):
 
     Numbers = TwoSwarmsNumbers
     Memory: ClassVar[type[Any] | None] = TwoSwarmsMemory
-    channels: ClassVar[Mapping[str, FieldTable]] = {"path": (*PATH_FIELDS, _TURN)}
+    channels: ClassVar[Mapping[str, FieldTable]] = {"path": (*PATH_FIELDS, _RIGHT_OF_WAY)}
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
         **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "arrival"},
         "stay": "+w_arrival · dt/T while the vehicle is within near_m of its goal, and when all are, for the time that "

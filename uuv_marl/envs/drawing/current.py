@@ -26,10 +26,10 @@ def paint_current(surface: pygame.Surface, scene: Scene, view: Camera, cell: flo
     places = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1).reshape(-1, 2)
     flow = scene.water.at(places) / shown_speed(scene.scenario)
     share = np.hypot(flow[:, 0], flow[:, 1])
-    weight = share > _LEAST
+    drawn = share > _LEAST
     flow *= np.minimum(1.0, _MOST / np.maximum(share, 1e-9))[:, None]
     along = np.stack([flow[:, 1], -flow[:, 0]], axis=-1) * ARROW * unit
-    for middle, vector in zip(view.pixels(places)[weight], along[weight], strict=True):
+    for middle, vector in zip(view.pixels(places)[drawn], along[drawn], strict=True):
         arrow(surface, middle - vector / 2.0, vector, unit)
 
 

@@ -103,7 +103,7 @@ def pixels(surface: pygame.Surface) -> NDArray[np.uint8]:
 
 def _numbers(scene: Scene) -> list[tuple[str, str, str, ink.Colour]]:
     """Label, short label, value and colour of each number in a header."""
-    limits, contact = scene.scenario.constraints, scene.scenario.collision.hull_radius_m
+    limits, hull_m = scene.scenario.constraints, scene.scenario.collision.hull_radius_m
 
     def distance(value: float, least: float, touching: float) -> tuple[str, ink.Colour]:
         colour = ink.ORANGE if value < touching else ink.AMBER if value < least else ink.TEXT
@@ -114,8 +114,8 @@ def _numbers(scene: Scene) -> list[tuple[str, str, str, ink.Colour]]:
         ("arrived after", "arrived", f"{scene.arrival_s:.1f} s", ink.GREEN)
         if arrived
         else ("time", "time", f"{scene.time_s:.1f} s", ink.TEXT),
-        ("smallest spacing", "spacing", *distance(scene.min_spacing_m, limits.s_u_m, 2.0 * contact)),
-        ("smallest obstacle distance", "clearance", *distance(scene.clearance_m, limits.s_o_m, contact)),
+        ("smallest spacing", "spacing", *distance(scene.min_spacing_m, limits.s_u_m, 2.0 * hull_m)),
+        ("smallest obstacle distance", "clearance", *distance(scene.clearance_m, limits.s_o_m, hull_m)),
         ("vehicles", "vehicles", f"{alive}" if alive == n else f"{alive} of {n}", ink.TEXT),
         ("collisions", "collisions", f"{scene.collisions}", ink.ORANGE if scene.collisions else ink.TEXT),
         (f"swarm's centre to {scene.place}", f"to {scene.place}", _metres(scene.centre_error_m), ink.TEXT),

@@ -27,7 +27,7 @@ class Window:
     """A window on one world.
 
     Args:
-        scenario: that is simulated.
+        scenario: the scenario that is simulated.
         look: size, camera and inspected vehicle at the start.
         fps: steps per second in real time, speed 1.
 

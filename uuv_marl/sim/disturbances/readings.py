@@ -57,14 +57,14 @@ class Readings(NamedTuple):
 class Detections(NamedTuple):
     """All detections of one array of all vehicles in a reading, one after the other."""
 
-    code: Annotated[Int64, "world hit", "Index of the listener, shifted left by ``SHIFT``, plus the place."]
-    target_index: Annotated[Int64, "world hit", "As in ``Readings``."]
-    reach: Annotated[Float64, "world hit", "Range [m], negative if missed."]
-    x: Annotated[Float64, "world hit", "Distance ahead of its position [m]."]
-    y: Annotated[Float64, "world hit", "Distance to starboard [m]."]
-    first: Annotated[Float64, "world hit", "Buffer for random numbers."]
-    second: Annotated[Float64, "world hit", "Buffer for random numbers."]
-    third: Annotated[Float64, "world hit", "Buffer for random numbers."]
+    code: Annotated[Int64, "world detection", "Index of the listener, shifted left by ``SHIFT``, plus the place."]
+    target_index: Annotated[Int64, "world detection", "As in ``Readings``."]
+    reach: Annotated[Float64, "world detection", "Range [m], negative if missed."]
+    x: Annotated[Float64, "world detection", "Distance ahead [m]."]
+    y: Annotated[Float64, "world detection", "Distance to starboard [m]."]
+    first: Annotated[Float64, "world detection", "Buffer for random numbers."]
+    second: Annotated[Float64, "world detection", "Buffer for random numbers."]
+    third: Annotated[Float64, "world detection", "Buffer for random numbers."]
 
 
 SHIFT, PLACE = 32, (1 << 32) - 1
@@ -78,7 +78,7 @@ def line_sizes(scenario: Scenario) -> dict[str, int]:
     return {
         "array": len(arrays),
         "place": scenario.sonar.num_sectors + scenario.sonar.num_active_sectors,
-        "hit": max(array.sub_sectors * (1 + (array.kind == "active")) for array in arrays)
+        "detection": max(array.sub_sectors * (1 + (array.kind == "active")) for array in arrays)
         * scenario.swarm.num_vehicles,
         "slot": 2 + math.floor(numbers.delay / float(numbers.every.min())),
         "past": math.floor(far) + 2 if far > 0.0 else 0,
@@ -222,7 +222,7 @@ def write_readings(
 def write_vehicle_readings(
     at: Reading, i: int, move: Move, timing: SonarTiming, readings: Readings, detected_index: Int32, see: Fields
 ) -> None:
-    """Write the vehicles that vehicle i detected in a reading into its percept, with the link their identities.
+    """Write the vehicles that vehicle i detected in a reading into its percept; for the link also their identities.
 
     A reading whose number is below 0 holds no detection.
     """

@@ -76,13 +76,13 @@ def nearest_walls(pose: Float64, c: float, s: float, discs: Float64, out: Float6
 
 @compiled
 def write_path(
-    state: State, world_map: WorldMap, heading: Float64, turn: Float64, lead: Float64, grid: MapGrid, path: Float64,
-    walls: Float64,
+    state: State, world_map: WorldMap, heading: Float64, turn: Float64, path_cost: Float64, grid: MapGrid,
+    path: Float64, walls: Float64,
 ) -> None:  # fmt: skip
     """Fill ``path`` (world, vehicle, 2) and ``walls`` (world, vehicle, wall, 2), body frame [m].
 
-    ``heading`` (world, vehicle, 2) and ``turn`` of the map (world, 2) are cosine and sine; ``lead``: remaining cost
-    from each cell, high near walls, shape (world, row, column).
+    ``heading`` (world, vehicle, 2) and ``turn`` of the map (world, 2) are cosine and sine; ``path_cost``: remaining
+    cost from each cell, high near walls, shape (world, row, column).
     """
     for w in range(path.shape[0]):
         turn_c, turn_s, discs = turn[w, 0], turn[w, 1], world_map.obstacles[w, : world_map.num_obstacles[w]]
@@ -90,7 +90,7 @@ def write_path(
             pose, c, s = state.eta[w, v], heading[w, v, 0], heading[w, v, 1]
             x, y = turn_c * pose[0] + turn_s * pose[1], turn_c * pose[1] - turn_s * pose[0]
             row, column = round((x - grid.x) / CELL_M), round((y - grid.y) / CELL_M)
-            i, j = point_ahead(lead[w], min(max(row, 0), grid.rows - 1), min(max(column, 0), grid.columns - 1))
+            i, j = point_ahead(path_cost[w], min(max(row, 0), grid.rows - 1), min(max(column, 0), grid.columns - 1))
             x, y = grid.x + i * CELL_M - x, grid.y + j * CELL_M - y
             x, y = turn_c * x - turn_s * y, turn_s * x + turn_c * y
             path[w, v, 0], path[w, v, 1] = c * x + s * y, c * y - s * x

@@ -47,7 +47,7 @@ class Basin(NamedTuple):
     """The largest [m]; the clear water of the goal begins there."""
 
     def ahead(self, x: float) -> float:
-        """The distance of a wall that is nearest to this [m]."""
+        """The distance nearest to ``x`` at which a wall may stand [m]."""
         return min(max(x, self.near), self.far)
 
 
