@@ -50,7 +50,7 @@ METRICS = (
 STATE = ("eta", "nu", "before", "alive", "tick", "dwell")
 FACTS = (
     "time_s", "reference", "centre", "spacing", "min_spacing", "max_spacing", "clearance", "obstacle_clearance",
-    "contacts", "collisions", "lost", "effort", "saturated", "arrival_s",
+    "vehicle_collisions", "collisions", "lost", "effort", "saturated", "arrival_s",
 )  # fmt: skip
 
 
@@ -123,7 +123,7 @@ def trained() -> str:
 def cases(other: Path) -> Iterator[tuple[str, str, Callable[..., str], tuple[Any, ...]]]:
     """Kind, name, maker and its arguments of every hash."""
     for (kind, (base, changes)), policy in itertools.product(SETS.items(), POLICIES):
-        if changes in PERIODS.values() and getattr(POLICIES[policy], "decision_period_s", None):
+        if changes in PERIODS.values() and POLICIES[policy].requirements.decision_period_s:
             continue  # it has its own
         name = f"{kind} {policy}"
         scenario = load_scenario(base, overrides=changes)
