@@ -114,12 +114,12 @@ def _panel(ax: Axes, table: Columns, quantity: Quantity, labels: Sequence[str]) 
 
 _CLOCKS = ((0.1, 0.1), (0.1, 0.05), (0.1, 0.02), (0.05, 0.05), (0.02, 0.02))
 CLOCKS: dict[str, dict[str, object]] = {
-    f"{hold:g}\n{step:g}": {
-        "timing.control_step_s": hold, "timing.decision_period_s": hold, "timing.integration_step_s": step
+    f"{control:g}\n{integration:g}": {
+        "timing.control_step_s": control, "timing.decision_period_s": control, "timing.integration_step_s": integration
     }
-    for hold, step in _CLOCKS
+    for control, integration in _CLOCKS
 }  # fmt: skip
-"""A control step and an integration step [s]; the policy decides at every hold."""
+"""A control step and an integration step [s]; the policy decides at every control step."""
 SIZES = {f"{n}": {"swarm.num_vehicles": n} for n in (10, 20, 54, 100, 200)}
 LOST = {
     f"{n}": {"losses.times_s": [round(float(t), 1) for t in np.linspace(30.0, 105.0, n)]} for n in (0, 6, 12, 24, 36)

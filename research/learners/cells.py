@@ -116,12 +116,12 @@ MEASURES = (
 
 def measures(metrics: Metrics, scenario: Scenario) -> dict[str, str]:
     """Headline, swarm success, collisions per vehicle, smallest distances [m], and time ratio [1], as texts."""
-    share, whole = shares_of(metrics, scenario.task_class.headline)
+    share, success = shares_of(metrics, scenario.task_class.headline)
     ratio = metrics["task"].get("time_ratio") if "task" in metrics else None
     if "task" not in metrics and metrics["task_time_s"] is not None:
         ratio = metrics["task_time_s"] / metrics["duration_s"]
-    contacts = metrics["collisions"] / scenario.swarm.num_vehicles
-    values = (share, float(whole), contacts, metrics["min_obstacle_distance_m"], metrics["min_spacing_m"], ratio)
+    collisions = metrics["collisions"] / scenario.swarm.num_vehicles
+    values = (share, float(success), collisions, metrics["min_obstacle_distance_m"], metrics["min_spacing_m"], ratio)
     return {name: "" if v is None else f"{v:.3g}" for name, v in zip(MEASURES, values, strict=True)}
 
 

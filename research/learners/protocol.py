@@ -1,4 +1,4 @@
-"""By what learners are compared: tasks, tiers of episodes, budgets, and each learner's settings (protocol.toml)."""
+"""Protocol of the comparison of learners: tasks, tiers of episodes, budgets and settings, from protocol.toml."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ AGENT_STEPS: int = _DATA["agent_steps"]
 MINUTES: float = _DATA["minutes"]
 MEASURES: int = _DATA["measures"]
 TRIED_ON: list[str] = _DATA["tried_on"]
-SEA, SEA_LEVEL = "disturbed", 1
+DISTURBED, LEVEL = "disturbed", 1
 """Name of a set with disturbances, and its level of the robustness axis ``X``."""
 
 
@@ -31,7 +31,7 @@ class EvaluationSet(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A scenario to learn, and the episodes by which it is judged."""
+    """A scenario to learn, and the episodes of its evaluation."""
 
     name: str
     """That of the scenario."""
@@ -48,11 +48,11 @@ class Task(NamedTuple):
 
     @property
     def scenario(self) -> Scenario:
-        """What is trained on, for every learner alike."""
+        """The scenario of the trainings, the same for all learners."""
         return load_scenario(self.name, num_vehicles=self.num_vehicles, overrides=overrides_for(self.name, {}))
 
     def training(self, **more: Any) -> Training:
-        """A training of ours on it, which also says what validations are of all learners."""
+        """A training with our trainer, which also determines the validations of all learners."""
         return Training(
             scenario=self.name, sizes=[self.num_vehicles], validations=MEASURES,
             validation_episodes=_DATA["validation_episodes"], **more,
@@ -60,15 +60,15 @@ class Task(NamedTuple):
 
 
 class Learner(NamedTuple):
-    """Who learns, and how."""
+    """A learning algorithm with its settings."""
 
     name: str
     trainer: str
-    """Whose trainer: ``own``, ``sb3``, ``benchmarl``."""
+    """``own``, ``sb3`` or ``benchmarl``."""
     tried: tuple[dict[str, object], ...]
     """Settings that were tried."""
     chosen: int
-    """Which of them it has."""
+    """Index of the chosen ones among them."""
 
     @property
     def settings(self) -> dict[str, object]:
@@ -83,9 +83,9 @@ def _task(table: Mapping[str, Any]) -> Task:
     tiers: list[list[EvaluationSet]] = [[EvaluationSet(task, task, own, seeds[0])], [], []]
     for tier, key in ((1, "two"), (2, "three")):
         for change in table[key]:
-            if change == SEA:
-                sea = AXES["X"].overrides(SEA_LEVEL, load_scenario(task).trajectory.speed_mps)
-                tiers[tier].append(EvaluationSet(f"{task}-{SEA}", task, own | sea, seeds[tier]))
+            if change == DISTURBED:
+                changes = AXES["X"].overrides(LEVEL, load_scenario(task).trajectory.speed_mps)
+                tiers[tier].append(EvaluationSet(f"{task}-{DISTURBED}", task, own | changes, seeds[tier]))
             else:
                 other = {**change}
                 name, scenario = other.pop("name"), other.pop("scenario", task)

@@ -14,7 +14,7 @@ Report = Callable[[float], None]
 
 
 class TrainingRequest(NamedTuple):
-    """A training that a trainer is asked for."""
+    """The training that a trainer has to run."""
 
     task: Task
     seed: int
