@@ -11,7 +11,7 @@ from uuv_marl.train.training import Training, overrides_for
 PROTOCOL = "protocol.toml"
 _DATA: dict[str, Any] = read_toml("learners", PROTOCOL)
 TRAININGS: int = _DATA["trainings"]
-"""Of each learner on each task, with seeds from 0 on."""
+"""Number of trainings of each learner on each task, with seeds from 0 on."""
 AGENT_STEPS: int = _DATA["agent_steps"]
 MINUTES: float = _DATA["minutes"]
 MEASURES: int = _DATA["measures"]
@@ -34,16 +34,16 @@ class Task(NamedTuple):
     """A scenario to learn, and the episodes of its evaluation."""
 
     name: str
-    """That of the scenario."""
+    """Name of the scenario."""
     num_vehicles: int
     policies: tuple[str, ...]
-    """Run beside the learners: first the best controller without extra observations, then others."""
+    """Policies to compare with: first the best controller without extra observations, then others."""
     tiers: tuple[tuple[EvaluationSet, ...], ...]
     """Sets of unseen seeds; of unseen sizes and ranges; of unseen kinds of maps and of disturbances."""
 
     @property
     def sets(self) -> tuple[EvaluationSet, ...]:
-        """Of all tiers."""
+        """The sets of all tiers."""
         return tuple(each for tier in self.tiers for each in tier)
 
     @property
@@ -72,7 +72,7 @@ class Learner(NamedTuple):
 
     @property
     def settings(self) -> dict[str, object]:
-        """What differs from the trainer's defaults."""
+        """Settings that differ from the trainer's defaults."""
         return self.tried[self.chosen]
 
 
