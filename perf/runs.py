@@ -9,7 +9,6 @@ import json
 import sys
 import zlib
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +35,7 @@ SETS = {name: (name, {}) for name in ("tracking", "single_obstacle", "multi_obst
     for end, changes in all_changes.items()
 }  # fmt: skip
 """Scenarios with changed fields, by name."""
-REWARD: Any = "sparse" if find_spec("uuv_marl.tasks") else "individual"
-"""The reward that both versions have, under its name in each."""
+REWARD: Any = "sparse"
 SEED, MOST_AGENT_STEPS = 10_000, 30_000
 """The first of the tuning seeds, which end before 100,000; where an episode is cut off, in decisions times vehicles."""
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
