@@ -9,7 +9,6 @@ import json
 import sys
 import zlib
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +35,7 @@ SETS = {name: (name, {}) for name in ("tracking", "single_obstacle", "multi_obst
     for end, changes in all_changes.items()
 }  # fmt: skip
 """Scenarios with changed fields, by name."""
-REWARD: Any = "sparse" if find_spec("uuv_marl.tasks") else "individual"
-"""The reward that both versions have, under its name in each."""
+REWARD: Any = "sparse"
 SEED, MOST_AGENT_STEPS = 10_000, 30_000
 """The first of the tuning seeds, which end before 100,000; where an episode is cut off, in decisions times vehicles."""
 SCENARIOS = ("tracking", "single_obstacle", "multi_obstacle", "lossy", "random_field")
@@ -50,7 +48,7 @@ METRICS = (
 STATE = ("eta", "nu", "before", "alive", "tick", "dwell")
 FACTS = (
     "time_s", "reference", "centre", "spacing", "min_spacing", "max_spacing", "clearance", "obstacle_clearance",
-    "contacts", "collisions", "lost", "effort", "saturated", "arrival_s",
+    "vehicle_collisions", "collisions", "lost", "effort", "saturated", "arrival_s",
 )  # fmt: skip
 
 
@@ -123,7 +121,7 @@ def trained() -> str:
 def cases(other: Path) -> Iterator[tuple[str, str, Callable[..., str], tuple[Any, ...]]]:
     """Kind, name, maker and its arguments of every hash."""
     for (kind, (base, changes)), policy in itertools.product(SETS.items(), POLICIES):
-        if changes in PERIODS.values() and getattr(POLICIES[policy], "decision_period_s", None):
+        if changes in PERIODS.values() and POLICIES[policy].requirements.decision_period_s:
             continue  # it has its own
         name = f"{kind} {policy}"
         scenario = load_scenario(base, overrides=changes)

@@ -23,10 +23,10 @@ def cells(metrics: Metrics, names: Sequence[str], digits: str) -> dict[str, str]
 
 def write_rows(path: Path, rows: Iterable[Row]) -> None:
     """Write rows, at least one, atomically; the same rows give the same bytes."""
-    columns, text = list(rows), io.StringIO(newline="")
-    table = csv.DictWriter(text, columns[0], lineterminator="\n")
-    table.writeheader()
-    table.writerows(columns)
+    table, text = list(rows), io.StringIO(newline="")
+    writer = csv.DictWriter(text, table[0], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(table)
     path.parent.mkdir(parents=True, exist_ok=True)
     data = text.getvalue().encode()
     with replacing(path) as partial:

@@ -1,4 +1,4 @@
-"""``python -m research.interfaces SB3-PPO``: what a learner of docs/interfaces.md reaches, as printed there.
+"""``python -m research.interfaces SB3-PPO``: the success of a learner of docs/interfaces.md, trained as printed there.
 
 It runs the block with a seed of that training, in an environment that has the library, and counts successful
 episodes on the validation seeds.
@@ -27,13 +27,13 @@ from uuv_marl.types import Bool, Float32
 
 PAGE = Path(FOLDER).parent / "docs" / "interfaces.md"
 FIRST, EPISODES = 900_000, 100
-"""Seeds of the episodes, from the first on, and how many."""
+"""First seed of the episodes, and their number."""
 Act = Callable[[Float32, Bool], Float32]
 """Actions (row, 2) for observations (row, entry), a row per vehicle, and whether its episode begins, shape (row,)."""
 
 
 class Learner(StrEnum):
-    """What the page trains."""
+    """Learners of the page."""
 
     PPO = "SB3-PPO"
     RECURRENT = "SB3-RecurrentPPO"
@@ -48,11 +48,11 @@ _WORDS = {
     Learner.MAPPO: "MappoConfig.", Learner.IPPO: "MappoConfig.", Learner.TORCHRL: "from torchrl.objectives",
     Learner.RLLIB: "from ray.rllib.",
 }  # fmt: skip
-"""What is in a learner's block alone."""
+"""Text that only a learner's block contains."""
 _IPPO = {"MappoConfig": "IppoConfig", "max_n_iters, config.lr = 15": "max_n_iters, config.lr = 25"}
-"""What the page says to change in MAPPO's block."""
+"""Changes of MAPPO's block, as the page says."""
 APART = 1000
-"""Trainings' seeds are so far apart that none starts from another's worlds."""
+"""Distance between the seeds of trainings, so that none starts from another's worlds."""
 app = typer.Typer(add_completion=False)
 
 
@@ -69,7 +69,7 @@ def printed(learner: Learner, training: int) -> str:
 
 
 def acting(learner: Learner, namespace: dict[str, Any]) -> Act:
-    """The mean actions of what the block has made."""
+    """The mean actions of the block's policy."""
     if learner in (Learner.PPO, Learner.RECURRENT):
         return _remembering(namespace["model"])
     if learner is Learner.RLLIB:

@@ -103,3 +103,7 @@ def test_evaluate_gives_a_dictionary_of_metrics_for_each_seed_in_their_order():
     assert [results[1]] == [{"seed": 3, **run.metrics} for run in runs]
     with pytest.raises(ScenarioError, match="yaw_damping_nms can't be 7: policy 'sdc' requires 600; leave it out"):
         uuv_marl.evaluate("sdc", "tracking", [0], overrides={"actuators.yaw_damping_nms": 7.0})
+    with pytest.raises(ScenarioError, match="^scenario 'none' is unknown"):
+        uuv_marl.evaluate("research.blind:Blind,inner=mappo", "none")
+    with pytest.raises(ValueError, match="^seed must be a whole number from 0, got -1"):
+        uuv_marl.evaluate("research.blind:Blind,inner=mappo", "starter", [-1])

@@ -16,7 +16,7 @@ SEED = 10_000
 """Seed of the maps: a tuning seed, so that no reported map is shown."""
 
 
-def way(discs: np.ndarray, length: float, task: object) -> np.ndarray:
+def shortest_path(discs: np.ndarray, length: float, task: object) -> np.ndarray:
     """A shortest path from the start to the goal that keeps the clearance, shape (point, 2) [m]."""
     numbers = task.numbers
     grid = numbers.grid()
@@ -48,7 +48,7 @@ def main() -> None:
             sampled = swarm.task.sample_map(np.random.default_rng(SEED))
             for x, y, radius in sampled.discs:
                 ax.add_patch(Circle((x, y), radius, color="0.55"))
-            ax.plot(*way(sampled.discs, sampled.length, swarm.task).T, color=BLUE)
+            ax.plot(*shortest_path(sampled.discs, sampled.length, swarm.task).T, color=BLUE)
             ax.plot([0.0, sampled.length], [0.0, 0.0], "o", color=ORANGE)
             ax.set(title=kind, xlim=(-100.0, 490.0), ylim=(-130.0, 130.0), aspect="equal")
         for ax in axes[len(KINDS) :]:

@@ -20,7 +20,7 @@ FOLDERS = ("docs", "perf", "examples", "uuv_marl")
 
 
 def copy_pages() -> None:
-    """Make the copy anew; files keep their times, so that Sphinx reads again only what changed."""
+    """Make the copy again; files keep their times, so that Sphinx reads again only what changed."""
     COPY.mkdir(parents=True, exist_ok=True)
     for name in FILES:
         shutil.copy2(ROOT / name, COPY / name)

@@ -1,1 +1,1 @@
-"""Research on the model: what the paper leaves open, stability, rest, and what changes with clocks and numbers."""
+"""Research on the model: parameters that the paper leaves open, stability, rest, time steps and swarm sizes."""

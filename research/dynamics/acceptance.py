@@ -52,7 +52,7 @@ class Measured(NamedTuple):
     """Yaw rate in it [deg/s]."""
     turn_radius_m: float
     coast_m: float
-    """Way from 1 to 0.1 m/s without thrust."""
+    """Distance from 1 to 0.1 m/s without thrust."""
     coast_s: float
     step_s: float
     """The longest integration step of ``handling.STEPS_S`` with which the vehicle is accepted."""
@@ -61,7 +61,7 @@ class Measured(NamedTuple):
 
 
 def measured(vehicle: str) -> Measured:
-    """What a vehicle does, by name or file. Raises ScenarioError as ``alone`` does."""
+    """The measured motion of a vehicle, by name or file. Raises ScenarioError as ``alone`` does."""
     scenario = alone(vehicle)
     (top_mps, turn_dps, radius_m), step_s = turn(scenario), scenario.timing.integration_step_s
     coast_m, coast_s = _coast(scenario)
@@ -77,7 +77,7 @@ def measured(vehicle: str) -> Measured:
 
 
 def _coast(scenario: Scenario) -> tuple[float, float]:
-    """Way [m] and time [s] from 1 to 0.1 m/s; within a step the speed falls evenly."""
+    """Distance [m] and time [s] from 1 to 0.1 m/s; within a step the speed falls evenly."""
     x, u, h = 0.0, 1.0, scenario.timing.integration_step_s
     for k, now in enumerate(swim(scenario, (0.0, 0.0), 3600.0, speed_mps=1.0)):
         if now[3] <= 0.1:
@@ -90,7 +90,7 @@ def _coast(scenario: Scenario) -> tuple[float, float]:
 def sway_yaw(scenario: Scenario, speed_mps: float) -> NDArray[np.complex128]:
     """Eigenvalues [1/s] of sway and yaw of a vehicle that goes straight, (2,), the larger real part first.
 
-    Those with a positive real part grow: without steering the vehicle turns off its way.
+    Those with a positive real part grow: without steering the vehicle turns off its course.
     """
     p, small = plant(scenario), 1e-7
 
@@ -111,7 +111,7 @@ def _measured(vehicle: str) -> Measured:
 
 
 def measures() -> list[Sequence[str]]:
-    """State6s of what every vehicle does, a head first."""
+    """Rows of the motion of every vehicle, the header first."""
     rows: list[Sequence[str]] = [
         ("vehicle", "top speed [m/s]", "turn at the limits [deg/s]", "at [m/s]", "radius [m]", "coasts [m]", "for [s]",
          "longest step [s]", "its error [m]")
@@ -134,7 +134,7 @@ def _order(metres: float) -> str:
 
 
 def figures() -> list[Sequence[str]]:
-    """State6s of what the sources state beside what is measured, a head first."""
+    """Rows of the sources' figures beside the measured ones, the header first."""
     rows: list[Sequence[str]] = [("vehicle", "quantity", "source", "stated", "measured", "tolerance")]
     for name in vehicle_names():
         stated = [figure for figure in FIGURES if figure.vehicle == name]
@@ -149,7 +149,7 @@ def figures() -> list[Sequence[str]]:
 
 
 def stability() -> list[Sequence[str]]:
-    """State6s of the eigenvalues of sway and yaw [1/s] by speed, a head first."""
+    """Rows of the eigenvalues of sway and yaw [1/s] by speed, the header first."""
     rows: list[Sequence[str]] = [("vehicle", *(f"{speed:g} m/s" for speed in SPEEDS_MPS))]
     for name in every():
         scenario = alone(name)

@@ -43,7 +43,7 @@ def identified() -> dict[str, Any]:
 
 
 def identify(output: Path, trials: int, report: Callable[[int, float], None]) -> Path:
-    """Search the unknowns; interrupted, the same call goes on with the same draws. Needs the extra ``tune``.
+    """Search the unknowns; an interrupted search continues with the same random numbers. Needs the extra ``tune``.
 
     Writes ``output/identified.json`` with the Pareto front and the point of the smallest largest error, and
     ``trials.csv`` with every trial, and keeps Optuna's journal beside them. ``report`` is called with the number of
@@ -59,7 +59,7 @@ def identify(output: Path, trials: int, report: Callable[[int, float], None]) ->
         return unknowns.errors(numbers)
 
     def sampler(seed: int) -> optuna.samplers.BaseSampler:
-        # No heed of trials that were cut off: a resumed search draws what an uninterrupted one draws.
+        # Without constant_liar interrupted trials are ignored, so a resumed search draws the same numbers.
         return optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=STARTUP, constant_liar=False)
 
     finished = search(output, "identify", trials, objective, sampler, report, len(OBJECTIVES), DEFAULTS)
@@ -132,13 +132,13 @@ def draw(computed: Tables) -> Figure:
 
 
 def _box(across: Sequence[float], up: Sequence[float]) -> Rectangle:
-    """The paper's numbers, 5 % wider: what a reproduction should hit."""
+    """The paper's numbers, 5 % wider: the target of a reproduction."""
     (left, right), (low, high) = ((min(values) * (1 - GOAL), max(values) * (1 + GOAL)) for values in (across, up))
     return Rectangle((left, low), right - left, high - low, fill=False, ec="black", ls="--", lw=1.3, label="paper, 5 %")
 
 
 def _draw(trial: Any, name: str) -> Value:
-    """One unknown of a trial, floats in four digits, so that what is written down is what was run."""
+    """One unknown of a trial, floats rounded to four digits, as they are written."""
     unknown = UNKNOWNS[name]
     if unknown.choices:
         return trial.suggest_categorical(name, unknown.choices)

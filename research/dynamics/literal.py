@@ -93,7 +93,7 @@ def draw(computed: Tables) -> Figure:
     """One panel for each reading."""
     figure, axes = panels(3, size=(4.6, 4.4))
     hull_m = load_scenario("tracking").collision.hull_radius_m
-    for ax, name, heading, what, contact_m in (
+    for ax, name, title, what, collision_m in (
         (axes[0], "literal-forward-only", "(a) both sectors ahead: tracking", "smallest spacing [m]", 2 * hull_m),
         (axes[1], "literal-centre-once", "(b) centre, once per obstacle: single obstacle",
          "smallest distance to its surface [m]", hull_m),
@@ -101,8 +101,8 @@ def draw(computed: Tables) -> Figure:
         table = computed[name]
         ax.plot(table["time_s"], table["as_taken_m"], color=BLUE, label="as we take it")
         ax.plot(table["time_s"], table["as_printed_m"], "--", color=ORANGE, label="as printed")
-        ax.axhline(contact_m, color=BLACK, linestyle=":", linewidth=1.0, label="collision")
-        against_time(ax, what, heading)
+        ax.axhline(collision_m, color=BLACK, linestyle=":", linewidth=1.0, label="collision")
+        against_time(ax, what, title)
     axes[1].set_ylim(-15.0, 60.0)
     ax = axes[2]
     for name, colour, mark in (("as printed", ORANGE, "s--"), ("classical", BLUE, "o-")):

@@ -57,7 +57,7 @@ class Variant:
 SMOOTH = Softening(near_m=14.0, far_m=20.0)
 """Fades neighbours between the first shell (about 12 m) and the second (about 21 m), where most come and go."""
 SURGE_DAMPED = Softening(surge_damping=2000.0)
-"""Half of what a hold of 0.1 s bears, 2 (m - X_u') / t_r = 4300."""
+"""Half of the largest stable value with a control step of 0.1 s, 2 (m - X_u') / t_r = 4300."""
 SMOOTH_DAMPED = SMOOTH._replace(surge_damping=SURGE_DAMPED.surge_damping)
 """Both."""
 VARIANTS = (
@@ -112,7 +112,7 @@ def tables(_suite: Suite, report: Share) -> Tables:
 def draw(computed: Tables) -> Figure:
     """Amplitudes by variant: all seeds as points, their mean as a bar; from the table alone."""
     rows = groups(computed["rest"], "variant", "t_r_s", "yaw_damping_nms")
-    names = [f"{name}, $t_r$ = {hold:g} s" + (f", yaw damping {c:g} N m s" if c else "") for name, hold, c in rows]
+    names = [f"{name}, $t_r$ = {step_s:g} s" + (f", yaw damping {c:g} N m s" if c else "") for name, step_s, c in rows]
     figure, axes = panels(2, size=(4.4, 0.36 * len(rows) + 1.6), sharey=True)
     for ax, (column, what) in zip(axes, _SHOWN.items(), strict=True):
         for row, own in enumerate(rows.values()):

@@ -34,7 +34,7 @@ SEEDS = (0, 1, 2, 3)
 CONTROL_STEPS_S = (0.0, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.15, 0.2)
 """Control steps t_r swept; 0 is feedback without delay."""
 SHOWN_CONTROL_STEPS_S = (0.0, 0.02, 0.05, 0.1)
-"""Control steps whose eigenvalues are tabled."""
+"""Control steps whose eigenvalues are in the table."""
 SWEEP_CONTROL_STEPS_S = (0.0, 0.1)
 """Control steps at which the yaw damping is swept."""
 DAMPING_NMS = (0.0, 60.0, 120.0, 200.0, 300.0, 400.0, 600.0)
@@ -85,8 +85,8 @@ def feedback(scenario: Scenario, rigid: Float64) -> Float64:
 def loop(scenario: Scenario, rigid: Float64, control_step_s: float) -> Float64:
     """The closed loop, shape (6 vehicle, 6 vehicle): the state's rate for a control step of 0, else its next sample.
 
-    Body forces are held for ``hold_s`` exactly (zero-order hold); the simulation's Runge-Kutta step differs from that
-    by its fifth-order error.
+    Body forces are held for ``control_step_s`` exactly (zero-order hold); the simulation's Runge-Kutta step differs
+    from that by its fifth-order error.
     """
     a, b = vehicle_jacobians(scenario)
     n = len(rigid) // 2
@@ -97,7 +97,7 @@ def loop(scenario: Scenario, rigid: Float64, control_step_s: float) -> Float64:
 
 
 def eigenvalues(scenario: Scenario, rigid: Float64, control_step_s: float) -> Complex128:
-    """Eigenvalues as rates [1/s]; those of a sampled loop as log(eigenvalue) / hold."""
+    """Eigenvalues as rates [1/s]; of a sampled loop log(eigenvalue) / t_r."""
     values = np.linalg.eigvals(loop(scenario, rigid, control_step_s)).astype(np.complex128)
     return cast(Complex128, np.log(values)) / control_step_s if control_step_s > 0.0 else values
 
@@ -110,7 +110,7 @@ def rates(values: Complex128) -> Rates:
 
 
 def tables(_suite: Suite, report: Share) -> Tables:
-    """``eigenvalues`` of the nominal swarm (first seed), ``margins``: growth rates as hold and yaw damping change."""
+    """``eigenvalues`` of the nominal swarm (first seed); ``margins``, growth rates over t_r and yaw damping."""
     # Two BLAS threads fight over a busy core, and round differently.
     with threadpool_limits(1, user_api="blas"):
         nominal = formations(straight_leg(), BioInspiredGains(), SEEDS)

@@ -1,6 +1,6 @@
-"""What the paper leaves out: each unknown with its range, what it stands for, and how far a choice is from the paper.
+"""What the paper leaves out: each unknown with its range and meaning, and the error of a choice.
 
-Only sections 5.1 and 5.2.1 (with Table 2) are looked at here; section 5.2.2 stays a prediction.
+Only sections 5.1 and 5.2.1 (with Table 2) are used here; section 5.2.2 stays a prediction.
 """
 
 import math

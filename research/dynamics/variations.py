@@ -51,10 +51,10 @@ def variation(
     """A part that runs the paper's controller on every variant, and shows every seed.
 
     Args:
-        name: of the part, and of its table.
-        axis: what the variants differ in, as the picture's axis is labelled.
-        variants: the fields of the scenario that each one changes, by its label on the axis.
-        quantities: what is shown, a panel each.
+        name: name of the part and of its table.
+        axis: label of the picture's axis: the field that the variants change.
+        variants: changed fields of the scenario, by the label on the axis.
+        quantities: shown quantities, a panel for each.
     """
     cases = {
         (label, quantity.scenario): Case(
@@ -87,9 +87,9 @@ def _panel(ax: Axes, table: Columns, quantity: Quantity, labels: Sequence[str]) 
     """Draw every seed's value by variant, their mean and the paper's number.
 
     Args:
-        ax: where to draw.
+        ax: axes to draw on.
         table: rows with variant, scenario, metric, seed and value.
-        quantity: which of them to show.
+        quantity: quantity to show.
         labels: the variants in the order of the axis.
     """
     ax.set_title(quantity.words)
@@ -114,17 +114,17 @@ def _panel(ax: Axes, table: Columns, quantity: Quantity, labels: Sequence[str]) 
 
 _CLOCKS = ((0.1, 0.1), (0.1, 0.05), (0.1, 0.02), (0.05, 0.05), (0.02, 0.02))
 CLOCKS: dict[str, dict[str, object]] = {
-    f"{hold:g}\n{step:g}": {
-        "timing.control_step_s": hold, "timing.decision_period_s": hold, "timing.integration_step_s": step
+    f"{control:g}\n{integration:g}": {
+        "timing.control_step_s": control, "timing.decision_period_s": control, "timing.integration_step_s": integration
     }
-    for hold, step in _CLOCKS
+    for control, integration in _CLOCKS
 }  # fmt: skip
-"""A control step and an integration step [s]; the policy decides at every hold."""
+"""A control step and an integration step [s]; the policy decides at every control step."""
 SIZES = {f"{n}": {"swarm.num_vehicles": n} for n in (10, 20, 54, 100, 200)}
 LOST = {
     f"{n}": {"losses.times_s": [round(float(t), 1) for t in np.linspace(30.0, 105.0, n)]} for n in (0, 6, 12, 24, 36)
 }
-"""So many vehicles lost one by one, between 30 and 105 s: before, at and after the obstacle."""
+"""Numbers of vehicles that are lost one after another, between 30 and 105 s: before, at and after the obstacle."""
 PARTS = (
     variation("time-steps", "control step [s] over integration step [s]", CLOCKS, OWN),
     variation("swarm-size", "vehicles", SIZES, OWN),

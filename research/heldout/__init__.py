@@ -1,1 +1,1 @@
-"""Held-out evaluation of learned policies beside the hand-made ones: sets, runs, page."""
+"""Held-out evaluation of learned policies and controllers: sets, runs, page."""

@@ -1,4 +1,4 @@
-"""``python -m research.heldout``: every policy on seeds that nothing was made with."""
+"""``python -m research.heldout``: evaluate every policy on held-out seeds."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""What is held out: seeds, worlds, swarm sizes, losses, echoes and decision periods that nothing was made with."""
+"""Held-out sets: seeds, worlds, swarm sizes, losses, echoes and decision periods, unused in training and tuning."""
 
 from typing import Any
 
@@ -12,15 +12,15 @@ FIRST: int = _DATA["first"]
 GROUPS: dict[str, list[str]] = _DATA["groups"]
 """Policies by the name of their group."""
 METRICS = ("task_time_s", "collisions", "min_obstacle_distance_m", "min_spacing_m")
-"""What is kept of an episode."""
+"""Metrics of an episode that are kept."""
 
 
 def _set(table: dict[str, Any]) -> EpisodeSet:
-    """One table of ``sets.toml``: so many seeds of each group of policies, from ``FIRST`` on."""
+    """One table of ``sets.toml``: a number of seeds of each group of policies, from ``FIRST`` on."""
     counts = {policy: count for group, count in table["seeds"].items() for policy in GROUPS[group]}
     seeds = {policy: range(FIRST, FIRST + count) for policy, count in counts.items()}
     return EpisodeSet(table["name"], table["scenario"], seeds, table.get("overrides", NOTHING))
 
 
 SETS = tuple(map(_set, _DATA["set"]))
-"""Those of ``sets.toml``, in the order of the page."""
+"""The sets of ``sets.toml``, in the order of the page."""

@@ -1,4 +1,4 @@
-"""Cells: a learner's training on a task with a seed, and what its policy does in the final episodes."""
+"""Cells: a learner's training on a task with a seed, and the final episodes of its policy."""
 
 import shutil
 import tomllib
@@ -25,7 +25,7 @@ _TRAINERS = {"own": "research.learners.own", "sb3": "research.learners.sb3", "be
 _TRAINED = 0.8
 """Share of the training in a cell's progress; assumed."""
 WEIGHTS_FOLDER = Path(__file__).resolve().parent / "policies"
-"""Weights that ship, so that their rows can be run again."""
+"""Folder of the shipped weights, so that their rows can be run again."""
 
 
 class Cell(NamedTuple):
@@ -51,7 +51,7 @@ class Cell(NamedTuple):
 
 
 def check_protocol(output: Path) -> None:
-    """Note in a new folder by which protocol it is made. Raises ResultsError where it was another."""
+    """Write the protocol into a new folder. Raises ResultsError if the folder has another one."""
     path, protocol = output / PROTOCOL, read_text("learners", PROTOCOL)
     if not path.exists():
         output.mkdir(parents=True, exist_ok=True)
@@ -67,13 +67,13 @@ def cells(tasks: list[str], learners: list[str], trainings: int) -> list[Cell]:
 
 
 def trainer_of(learner: Learner) -> Trainer:
-    """Its trainer; imports the library."""
+    """Import the trainer of a learner."""
     learn: Trainer = import_module(_TRAINERS[learner.trainer]).learn
     return learn
 
 
 def emptied(folder: Path) -> None:
-    """Remove all that a folder holds."""
+    """Empty a folder."""
     for path in folder.iterdir():
         shutil.rmtree(path) if path.is_dir() else path.unlink()
 
@@ -100,7 +100,7 @@ def every(task: Task, policy: str, report: Report) -> Iterator[Row]:
 
 
 def episodes(policy: str, each: EvaluationSet, seeds: range) -> Iterator[Row]:
-    """What a policy does in a set's episodes, by seed."""
+    """Rows of a policy on the episodes of a set, by seed."""
     scenario = with_policy_requirements(policy, load_scenario(each.scenario, overrides=each.overrides))
     rows = [
         {"set": each.name, "seed": str(run.seed), **measures(run.metrics, scenario)}
@@ -116,24 +116,24 @@ MEASURES = (
 
 def measures(metrics: Metrics, scenario: Scenario) -> dict[str, str]:
     """Headline, swarm success, collisions per vehicle, smallest distances [m], and time ratio [1], as texts."""
-    share, whole = shares_of(metrics, scenario.task_class.headline)
+    share, success = shares_of(metrics, scenario.task_class.headline)
     ratio = metrics["task"].get("time_ratio") if "task" in metrics else None
     if "task" not in metrics and metrics["task_time_s"] is not None:
         ratio = metrics["task_time_s"] / metrics["duration_s"]
-    contacts = metrics["collisions"] / scenario.swarm.num_vehicles
-    values = (share, float(whole), contacts, metrics["min_obstacle_distance_m"], metrics["min_spacing_m"], ratio)
+    collisions = metrics["collisions"] / scenario.swarm.num_vehicles
+    values = (share, float(success), collisions, metrics["min_obstacle_distance_m"], metrics["min_spacing_m"], ratio)
     return {name: "" if v is None else f"{v:.3g}" for name, v in zip(MEASURES, values, strict=True)}
 
 
 def read(cell: Cell, folder: Path) -> tuple[list[Row], list[Row]]:
-    """Its curve and its episodes, each row with the cell's place."""
+    """Curve and episodes of a cell, each row with its task, learner and training."""
     place = {"task": cell.task.name, "learner": cell.learner.name, "training": str(cell.seed)}
     curve, final = (read_rows(folder / name) for name in (CURVE, EPISODES))
     return [{**place, **row} for row in curve], [{**place, **row} for row in final]
 
 
 def beside(output: Path, report: Report) -> list[Row]:
-    """Episodes of the policies that stand beside learners, and others' rows; what was run before is read."""
+    """Episodes of the policies to compare with, and rows of external policies; finished ones are read."""
     todo = [(task, policy) for task in TASKS.values() for policy in task.policies]
     rows: list[Row] = []
     for k, (task, policy) in enumerate(todo):

@@ -1,4 +1,4 @@
-"""BenchMARL's ISAC as a learner, the one that is not PPO. Runs in the environment of ``make test-benchmarl``."""
+"""BenchMARL's ISAC as a learner, the only one without PPO. Runs in the environment of ``make test-benchmarl``."""
 
 # pyright: reportMissingImports=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownParameterType=false, reportUntypedBaseClass=false
@@ -27,7 +27,7 @@ from uuv_marl.train.rows import TRAINING_SEEDS
 from uuv_marl.train.training import overrides_for
 
 REPLAYED = 500_000
-"""Agent-steps that are kept to learn from."""
+"""Size of the replay buffer, in agent-steps."""
 
 
 class _SpentError(Exception):
@@ -35,7 +35,7 @@ class _SpentError(Exception):
 
 
 class _Measured(Callback):
-    """Measures when it is due, and ends the training when the budget is spent."""
+    """Measures the policy when due, and ends the training when the budget is spent."""
 
     def __init__(self, watch: Watch, folder: Path, vehicles: int) -> None:
         super().__init__()
@@ -63,7 +63,7 @@ def tensors_of(actor: Any) -> dict[str, Any]:
 
 
 def learn(asked: TrainingRequest) -> list[Row]:
-    """As ``watch.Trainer`` says."""
+    """A ``watch.Trainer``."""
     torch.set_num_threads(1)
     settings, task, folder, watch = asked.settings, asked.task, asked.folder, Watch(asked)
     config = ExperimentConfig.get_from_yaml()

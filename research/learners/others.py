@@ -1,4 +1,4 @@
-"""``python -m research.learners.others``: rows of a policy from elsewhere, made, or checked digit by digit."""
+"""``python -m research.learners.others``: make the rows of an external policy, or check them digit by digit."""
 
 from pathlib import Path
 from typing import Annotated
@@ -26,7 +26,7 @@ def main(
 ) -> None:
     """Make the rows of a policy on a task if the file is not there; else run a sample of them again.
 
-    If the sample comes again alike, the rows go into OUTPUT/others, and python -m research.learners puts them on the
+    If all of the sample agree, the rows go into OUTPUT/others, and python -m research.learners puts them on the
     page, marked as checked.
 
     Example: python -m research.learners.others runs/sb3 sb3.csv --task hard_water
@@ -49,11 +49,11 @@ def main(
             report(1.0)
         path = output / OTHERS / task / f"{rows.name.removesuffix('.gz').removesuffix('.csv')}.csv"
         write_rows(path, rows_given)
-        console.print(f"  {len(drawn)} of {len(rows_given)} rows came again alike: {path}", highlight=False)
+        console.print(f"  {len(drawn)} of {len(rows_given)} rows agree in every digit: {path}", highlight=False)
 
 
 def check_complete(rows: list[Row], task: Task) -> None:
-    """Refuse rows that leave out an episode, have one twice, or are of something else. Raises ResultsError."""
+    """Raise ResultsError for rows that lack an episode, have one twice, or belong to something else."""
     columns = ["set", "seed", *MEASURES]
     got = list(rows[0]) if rows else []
     if got != columns:
@@ -70,11 +70,11 @@ def check_complete(rows: list[Row], task: Task) -> None:
 
 
 def check_equal(row: Row, policy: str, task: Task) -> None:
-    """Run the episode of a row again. Raises ResultsError where it is another."""
+    """Run the episode of a row again. Raises ResultsError if it differs."""
     seed, each = int(row["seed"]), next(each for each in task.sets if each.name == row["set"])
     (again,) = episodes(policy, each, range(seed, seed + 1))
     if other := [f"{key} {row.get(key)}, now {value}" for key, value in again.items() if row.get(key) != value]:
-        raise ResultsError(f"set {each.name}, seed {seed} came again with {'; '.join(other)}")
+        raise ResultsError(f"set {each.name}, seed {seed} differs: {'; '.join(other)}")
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from uuv_marl.train.validation import validate
 
 
 def learn(asked: TrainingRequest) -> list[Row]:
-    """As ``watch.Trainer`` says. Without a cost of collisions beyond the reward, as for all learners."""
+    """A ``watch.Trainer``. Without a cost of collisions beyond the reward, as for all learners."""
     settings = asked.task.training(steps=asked.agent_steps, seed=asked.seed).model_dump(mode="json")
     training = Training(**changed_fields(settings, {"ppo.collision_cost": [0.0, 0.0], **asked.settings}))
     curve: list[Row] = []

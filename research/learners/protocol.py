@@ -1,4 +1,4 @@
-"""By what learners are compared: tasks, tiers of episodes, budgets, and each learner's settings (protocol.toml)."""
+"""Protocol of the comparison of learners: tasks, tiers of episodes, budgets and settings, from protocol.toml."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -11,12 +11,12 @@ from uuv_marl.train.training import Training, overrides_for
 PROTOCOL = "protocol.toml"
 _DATA: dict[str, Any] = read_toml("learners", PROTOCOL)
 TRAININGS: int = _DATA["trainings"]
-"""Of each learner on each task, with seeds from 0 on."""
+"""Number of trainings of each learner on each task, with seeds from 0 on."""
 AGENT_STEPS: int = _DATA["agent_steps"]
 MINUTES: float = _DATA["minutes"]
 MEASURES: int = _DATA["measures"]
 TRIED_ON: list[str] = _DATA["tried_on"]
-SEA, SEA_LEVEL = "disturbed", 1
+DISTURBED, LEVEL = "disturbed", 1
 """Name of a set with disturbances, and its level of the robustness axis ``X``."""
 
 
@@ -31,28 +31,28 @@ class EvaluationSet(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A scenario to learn, and the episodes by which it is judged."""
+    """A scenario to learn, and the episodes of its evaluation."""
 
     name: str
-    """That of the scenario."""
+    """Name of the scenario."""
     num_vehicles: int
     policies: tuple[str, ...]
-    """Run beside the learners: first the best controller without extra observations, then others."""
+    """Policies to compare with: first the best controller without extra observations, then others."""
     tiers: tuple[tuple[EvaluationSet, ...], ...]
     """Sets of unseen seeds; of unseen sizes and ranges; of unseen kinds of maps and of disturbances."""
 
     @property
     def sets(self) -> tuple[EvaluationSet, ...]:
-        """Of all tiers."""
+        """The sets of all tiers."""
         return tuple(each for tier in self.tiers for each in tier)
 
     @property
     def scenario(self) -> Scenario:
-        """What is trained on, for every learner alike."""
+        """The scenario of the trainings, the same for all learners."""
         return load_scenario(self.name, num_vehicles=self.num_vehicles, overrides=overrides_for(self.name, {}))
 
     def training(self, **more: Any) -> Training:
-        """A training of ours on it, which also says what validations are of all learners."""
+        """A training with our trainer, which also determines the validations of all learners."""
         return Training(
             scenario=self.name, sizes=[self.num_vehicles], validations=MEASURES,
             validation_episodes=_DATA["validation_episodes"], **more,
@@ -60,19 +60,19 @@ class Task(NamedTuple):
 
 
 class Learner(NamedTuple):
-    """Who learns, and how."""
+    """A learning algorithm with its settings."""
 
     name: str
     trainer: str
-    """Whose trainer: ``own``, ``sb3``, ``benchmarl``."""
+    """``own``, ``sb3`` or ``benchmarl``."""
     tried: tuple[dict[str, object], ...]
     """Settings that were tried."""
     chosen: int
-    """Which of them it has."""
+    """Index of the chosen ones among them."""
 
     @property
     def settings(self) -> dict[str, object]:
-        """What differs from the trainer's defaults."""
+        """Settings that differ from the trainer's defaults."""
         return self.tried[self.chosen]
 
 
@@ -83,9 +83,9 @@ def _task(table: Mapping[str, Any]) -> Task:
     tiers: list[list[EvaluationSet]] = [[EvaluationSet(task, task, own, seeds[0])], [], []]
     for tier, key in ((1, "two"), (2, "three")):
         for change in table[key]:
-            if change == SEA:
-                sea = AXES["X"].overrides(SEA_LEVEL, load_scenario(task).trajectory.speed_mps)
-                tiers[tier].append(EvaluationSet(f"{task}-{SEA}", task, own | sea, seeds[tier]))
+            if change == DISTURBED:
+                changes = AXES["X"].overrides(LEVEL, load_scenario(task).trajectory.speed_mps)
+                tiers[tier].append(EvaluationSet(f"{task}-{DISTURBED}", task, own | changes, seeds[tier]))
             else:
                 other = {**change}
                 name, scenario = other.pop("name"), other.pop("scenario", task)

@@ -19,11 +19,11 @@ from uuv_marl.train.sb3 import save_sb3
 from uuv_marl.train.training import ROWS
 
 STEPS = 64
-"""Decisions of each world between two updates, as our own trainer has."""
+"""Decisions of each world between two updates, as in our own trainer."""
 
 
 class _Measured(BaseCallback):
-    """Measures when it is due, and ends the training when the budget is spent."""
+    """Measures the policy when due, and ends the training when the budget is spent."""
 
     def __init__(self, watch: Watch, folder: Path) -> None:
         super().__init__()
@@ -36,7 +36,7 @@ class _Measured(BaseCallback):
         self.measure()
 
     def measure(self) -> None:
-        """If it is due."""
+        """Measure the policy if it is due."""
         if self._watch.due(self.num_timesteps):
             candidate = self._folder / "candidate.safetensors"
             save_sb3(self.model, candidate)  # type: ignore[arg-type]
@@ -45,7 +45,7 @@ class _Measured(BaseCallback):
 
 
 def learn(asked: TrainingRequest) -> list[Row]:
-    """As ``watch.Trainer`` says."""
+    """A ``watch.Trainer``."""
     torch.set_num_threads(1)
     settings, task, watch = dict(asked.settings), asked.task, Watch(asked)
     worlds = max(1, round(ROWS / task.num_vehicles))

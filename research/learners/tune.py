@@ -16,7 +16,7 @@ from uuv_marl.cli.console import console, explained, path_option, progress_line,
 from uuv_marl.errors import ResultsError
 
 SEED, PART = 100, 3
-"""Of the trainings, which no other has, and the part of the budget that they get: one third."""
+"""Seed of the trainings, which no other training has, and the divisor of their budget."""
 app = typer.Typer(add_completion=False)
 
 
@@ -25,7 +25,7 @@ def main(
     learner: Annotated[str, typer.Argument(help=f"One of {', '.join(LEARNERS)}.")],
     output: Annotated[Path, path_option("Folder for the trainings.")] = Path("results/learners-tuning"),
 ) -> None:
-    """Train a learner with each of its settings on two tasks, and write what came of it.
+    """Train a learner with each of its settings on two tasks, and write the scores.
 
     A trial's score is the mean over both tasks of its best validation: the mean of the headline and of swarm
     success. OUTPUT/LEARNER.csv holds them all.
@@ -50,7 +50,7 @@ def main(
 
 
 def _trial(learner: str, k: int, settings: dict[str, object], folder: Path, report: Report) -> Row:
-    """One setting on all tasks that are tried on."""
+    """One setting on the tasks of ``TRIED_ON``."""
     scores: dict[str, str] = {}
     for name in TRIED_ON:
         (folder / name).mkdir(parents=True, exist_ok=True)

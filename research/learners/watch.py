@@ -1,4 +1,4 @@
-"""What a training may spend, and its curve: the same for every learner."""
+"""Budget and curve of a training, the same for every learner."""
 
 import time
 from collections.abc import Callable
@@ -14,27 +14,27 @@ Report = Callable[[float], None]
 
 
 class TrainingRequest(NamedTuple):
-    """A training that a trainer is asked for."""
+    """The training that a trainer has to run."""
 
     task: Task
     seed: int
     folder: Path
-    """Where the best policy goes, ``policy.safetensors``."""
+    """Folder of the best policy, ``policy.safetensors``."""
     settings: dict[str, Any]
-    """What differs from the trainer's defaults."""
+    """Settings that differ from the trainer's defaults."""
     agent_steps: int
-    """The whole budget."""
+    """Budget of agent-steps."""
     minutes: float
-    """Of processor time, if that ends first."""
+    """Budget of processor time [min]; the training ends with the first that is spent."""
     report: Report
 
 
 Trainer = Callable[[TrainingRequest], list[Row]]
-"""Trains, leaves its best policy, and gives the curve: a row for each measurement."""
+"""Trains, writes its best policy, and returns the curve: a row for each measurement."""
 
 
 class Watch:
-    """Counts processor time, measuring apart, and measures a policy in even parts of the budget."""
+    """Counts processor time without measuring, and measures a policy at equal parts of the budget."""
 
     def __init__(self, asked: TrainingRequest) -> None:
         self.curve: list[Row] = []
@@ -44,7 +44,7 @@ class Watch:
 
     @property
     def minutes(self) -> float:
-        """Processor time so far, measuring apart [min]."""
+        """Processor time so far without measuring [min]."""
         return (time.process_time() - self._begin - self._apart) / 60.0
 
     @property
@@ -53,7 +53,7 @@ class Watch:
         return self.minutes >= self._asked.minutes
 
     def share(self, agent_steps: int) -> float:
-        """The part of the budget that is spent after so many agent-steps."""
+        """Share of the budget that is spent after a number of agent-steps."""
         spent = max(agent_steps / self._asked.agent_steps, self.minutes / self._asked.minutes)
         self._asked.report(min(spent, 1.0))
         return spent
@@ -63,7 +63,7 @@ class Watch:
         return len(self.curve) < MEASURES and self.share(agent_steps) * MEASURES >= len(self.curve) + 1
 
     def measure(self, policy: str, agent_steps: int) -> bool:
-        """Run a policy on the episodes of validation, and note what came of it; whether it is the best so far."""
+        """Run a policy on the validation episodes, and record the results; whether it is the best so far."""
         minutes, begin, vehicles = self.minutes, time.process_time(), self._asked.task.num_vehicles
         judged = validate(policy, self._training)
         self._apart += time.process_time() - begin

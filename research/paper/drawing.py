@@ -64,14 +64,14 @@ def route_table(suite: Suite, case: Case) -> Columns:
     """Routes of seed 0: a row for each vehicle and second."""
     trace = suite.trace(case, 0)
     position, time = trace["route_position"], trace["route_time_s"]
-    routes: Int64 = np.unique(np.append(np.arange(0, len(time), 2), len(time) - 1))
+    samples: Int64 = np.unique(np.append(np.arange(0, len(time), 2), len(time) - 1))
     vehicles = int(position.shape[1])
     return {
-        "vehicle": np.repeat(np.arange(vehicles), len(routes)),
-        "group": np.repeat(start_groups(trace), len(routes)),
-        "time_s": np.tile(time[routes], vehicles),
-        "x_m": position[routes, :, 0].T.ravel(),
-        "y_m": position[routes, :, 1].T.ravel(),
+        "vehicle": np.repeat(np.arange(vehicles), len(samples)),
+        "group": np.repeat(start_groups(trace), len(samples)),
+        "time_s": np.tile(time[samples], vehicles),
+        "x_m": position[samples, :, 0].T.ravel(),
+        "y_m": position[samples, :, 1].T.ravel(),
     }
 
 

@@ -17,8 +17,8 @@ from uuv_marl.benchmark.paper import PAPER
 from uuv_marl.benchmark.style import BLACK, COLOURS, ORANGE, legend, panels
 from uuv_marl.benchmark.suite import Case, Suite
 
-Made = tuple[Callable[[Suite, Case], Columns], Case]
-"""How a table is made, and of which case."""
+TableOf = tuple[Callable[[Suite, Case], Columns], Case]
+"""A function that makes a table, and its case."""
 
 
 def distances(suite: Suite, case: Case) -> Columns:
@@ -73,7 +73,7 @@ def figure_12_or_13(name: str, symbol: str, small: Case, large: Case) -> Part:
     return part(name, (small, large, SINGLE), tables, draw)
 
 
-def part(name: str, cases: tuple[Case, ...], tables: Mapping[str, Made], draw: Callable[[Tables], Figure]) -> Part:
+def part(name: str, cases: tuple[Case, ...], tables: Mapping[str, TableOf], draw: Callable[[Tables], Figure]) -> Part:
     """A part whose tables are each a function of one case."""
 
     def compute(suite: Suite, _report: Share) -> Tables:

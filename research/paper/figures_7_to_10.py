@@ -134,15 +134,15 @@ def figure_10(suite: Suite, _report: Share) -> Tables:
 def draw_10(computed: Tables) -> Figure:
     """Each by itself, so that its changes can be seen, with the paper's numbers and the bounds."""
     figure, axes = panels(2)
-    table, scenario, controller = computed["figure-10"], TRACKING.load(), PAPER["tracking", "bio_inspired"]
+    table, scenario, stated = computed["figure-10"], TRACKING.load(), PAPER["tracking", "bio_inspired"]
     for ax, name, words in zip(axes, ("max_spacing_m", "min_spacing_m"), ("(a) largest", "(b) smallest"), strict=True):
         ax.plot(table["time_s"], table[name], color=BLUE, label="ours")
         drawing.mark_corners(ax, TRACKING)
         drawing.against_time(ax, f"{words[4:]} distance between two vehicles [m]", words)
         ax.set_ylim(0.0, 1.05 * float(table[name].max()))
     for value, style, colour, label in (
-        (controller.mean_min_spacing_m, "--", GREEN, "paper, time mean of the smallest"),
-        (controller.min_spacing_m, "-.", GREEN, "paper, smallest"),
+        (stated.mean_min_spacing_m, "--", GREEN, "paper, time mean of the smallest"),
+        (stated.min_spacing_m, "-.", GREEN, "paper, smallest"),
         (scenario.constraints.s_u_m, ":", ORANGE, "keep apart (s_u)"),
         (2.0 * scenario.collision.hull_radius_m, "--", ORANGE, "collision"),
     ):

@@ -1,6 +1,6 @@
-"""Measures of a run, taken from its traces, by which the paper's sentences are tested.
+"""Measures of a run for the paper's claims, from its traces.
 
-Below them what is read off routes: distance from the path, turns, groups, sides. Frame north, east [m].
+Below them measures of trajectories: distance from the path, turns, groups, sides. Frame north, east [m].
 """
 
 from itertools import pairwise
@@ -29,7 +29,7 @@ def between(trace: Trace, name: str, start: float, end: float) -> Float32:
 
 
 def corners(trace: Trace) -> Float64:
-    """When l(t) passes the corners, and the end [s]."""
+    """Times at which l(t) passes the corners and the end [s]."""
     return corner_times(trace["waypoints"], SPEED_MPS)
 
 
@@ -47,7 +47,7 @@ def order_on_last_leg(trace: Trace) -> float:
 
 
 def unrest_at_end(trace: Trace) -> float:
-    """How much the distances between vehicles still vary in the last 10 s [m]."""
+    """Variation of the distances between vehicles in the last 10 s [m]."""
     return pair_unrest(between(trace, "route_position", trace["time_s"][-1] - 10.0, np.inf))
 
 
@@ -76,7 +76,7 @@ def rise_after_corners(trace: Trace) -> float:
 
 
 def left_at_next_corner(trace: Trace) -> float:
-    """What is left of that rise at the next corner, the larger share."""
+    """Remaining share of that rise at the next corner, the larger one."""
     return max(
         off_path(trace, after - 10.0, after).mean() / off_path(trace, t, t + WINDOW_S).max()
         for t, after in pairwise(corners(trace))

@@ -14,7 +14,7 @@ from uuv_marl.benchmark.suite import Case, Suite
 from uuv_marl.benchmark.tables import markdown_table
 
 METRICS = tuple(dict.fromkeys(number.metric for number in NUMBERS))
-"""What is kept of an episode."""
+"""Metrics of an episode that are kept."""
 DIGITS = ".6g"
 _CASES = {(number.case.scenario, number.case.policy): number.case for number in NUMBERS}
 

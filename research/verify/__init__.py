@@ -1,1 +1,1 @@
-"""Shipped episodes run again: what a row of each file comes from, and whether its numbers are those of today."""
+"""Shipped episodes run again: the source of each row, and whether its numbers are reproduced."""

@@ -65,7 +65,7 @@ def find(paths: Sequence[Path]) -> tuple[list[Row], list[Path]]:
 
 
 def _docs() -> Path:
-    """Those of the checkout that holds this file."""
+    """Folder docs of this checkout."""
     return Path(__file__).resolve().parents[2] / "docs"
 
 
@@ -97,7 +97,7 @@ def fresh_seed() -> int:
 
 
 def draw(rows: Sequence[Row], sample: int, seed: int) -> list[Row]:
-    """At most ``sample`` rows in random order, so that the first of them are a fair sample, too."""
+    """At most ``sample`` rows in random order, so that the first of them are also a fair sample."""
     picked = np.random.default_rng(seed).choice(len(rows), min(sample, len(rows)), replace=False)
     return [rows[k] for k in picked.tolist()]
 
@@ -137,12 +137,12 @@ def failed(verdicts: Sequence[Verdict]) -> bool:
 
 
 def _upper_bound(count: int, rows: int) -> float:
-    """The share that is exceeded with a probability of 5 % at most, where so many of the rows count (exact)."""
+    """Upper 95 % confidence bound of a share, for ``count`` of ``rows`` (exact)."""
     return float(binomtest(count, rows).proportion_ci(confidence_level=0.9, method="exact").high)
 
 
 def summary(verdicts: Sequence[Verdict], rows: int) -> str:
-    """How many agree, and what that says of all rows."""
+    """The number of rows that agree, and a bound for all rows."""
     run = [verdict for verdict in verdicts if not verdict.reason]
     if not verdicts:
         return "No row was run."

@@ -1,4 +1,4 @@
-"""Files of episodes, and how each of their rows is made again."""
+"""Files of episodes, and the scenario and policy of each of their rows."""
 
 import csv
 import io
@@ -34,7 +34,7 @@ class NoEpisodesError(ResultsError):
 
 
 class Source(NamedTuple):
-    """What a row is made of, beside its seed."""
+    """Scenario and policy of a row."""
 
     scenario: Scenario
     """The scenario without the policy's requirements."""
@@ -45,13 +45,13 @@ class Kind(NamedTuple):
     """A kind of file, for all of its rows."""
 
     keys: Sequence[str]
-    """Columns that say which episode a row is; one of them is ``seed``."""
+    """Columns that identify an episode; one of them is ``seed``."""
     measured: Sequence[str]
-    """All other columns, which the simulation gives."""
+    """All other columns, from the simulation."""
     source: Callable[[Cells], Source]
     """Raises ScenarioError, PolicyError or ResultsError where a row can't be made again here."""
     written: Callable[[Cells, Metrics], Sequence[str]]
-    """What would stand in the measured columns."""
+    """From a row and its metrics today to the texts of the measured columns."""
 
 
 class Row(NamedTuple):
@@ -70,7 +70,7 @@ class Row(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Which episode it is."""
+        """The episode in words."""
         return ", ".join(f"{key} {self.cells[key]}" for key in self.kind.keys if self.cells[key])
 
     @property
@@ -102,7 +102,7 @@ def rows_of(file: Path) -> list[Row]:
 
 
 def _kind(head: Sequence[str]) -> Kind | None:
-    """The kind of table that has these columns: those that say which episode it is, then metrics."""
+    """The kind of table that has these columns: those that identify an episode, then metrics."""
     kinds: tuple[tuple[tuple[str, ...], Callable[[Cells], Source], str], ...] = (
         (("set", "policy", "seed"), _set, DIGITS),
         (("scenario", "axis", "level", "policy", "seed"), _robustness, robustness.DIGITS),

@@ -37,7 +37,7 @@ def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, mo
     monkeypatch.setattr(cells, "AGENT_STEPS", 45_000)
     for module in (protocol, watch):
         monkeypatch.setattr(module, "MEASURES", 2)
-    monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
+    monkeypatch.setitem(protocol._DATA, "validation_episodes", 1)
     cell = cells.Cell(task, LEARNERS[name], 0)
     folder = cell.folder(tmp_path)
     (folder / "run" / "checkpoints").mkdir(parents=True)
@@ -66,7 +66,7 @@ def test_a_folder_has_one_protocol(tmp_path):
 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_a_training_that_runs_out_of_time_is_measured_at_its_end(name, tmp_path, monkeypatch):
-    monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
+    monkeypatch.setitem(protocol._DATA, "validation_episodes", 1)
     task = TASKS["hard_water"]
     asked = watch.TrainingRequest(task, 0, tmp_path, LEARNERS[name].settings, 5_000_000, 0.02, quiet)
     curve = cells.trainer_of(LEARNERS[name])(asked)
@@ -78,14 +78,14 @@ def test_a_training_that_runs_out_of_time_is_measured_at_its_end(name, tmp_path,
 def test_the_time_of_a_field_is_over_that_of_its_own_reference():
     (first,) = TASKS["random_field"].tiers[0]
     rows = list(cells.episodes("scout", first, range(7000, 7003)))
-    assert all(1.0 <= float(row["time"]) < 1.1 for row in rows)
+    assert all(1.0 <= float(row["time_ratio"]) < 1.1 for row in rows)
 
 
 def test_what_isac_learned_acts_alike_without_torch(tmp_path, monkeypatch):
     actors = []
     usual = isac.tensors_of
     monkeypatch.setattr(isac, "tensors_of", lambda actor: actors.append(actor) or usual(actor))
-    monkeypatch.setitem(protocol._TOLD, "validation_episodes", 1)
+    monkeypatch.setitem(protocol._DATA, "validation_episodes", 1)
     task = TASKS["hard_water"]
     isac.learn(watch.TrainingRequest(task, 0, tmp_path, LEARNERS["ISAC"].settings, 25_000, 1.0, quiet))
     (tmp_path / "now").write_bytes(safetensors.numpy.save(usual(actors[0])))
@@ -262,9 +262,9 @@ def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
         others.check_equal(row, "scout", few)
     with pytest.raises(ResultsError, match="set hard_water must have the seeds 7000 to 7001 once each, got 1 rows"):
         others.check_complete(rows[1:], few)
-    with pytest.raises(ResultsError, match="set hard_water, seed 7000 came again with to_others 9.9, now"):
+    with pytest.raises(ResultsError, match="set hard_water, seed 7000 differs: min_spacing_m 9.9, now"):
         others.check_equal({**rows[0], "min_spacing_m": "9.9"}, "scout", few)
-    with pytest.raises(ResultsError, match="came again with"):
+    with pytest.raises(ResultsError, match="seed 7000 differs: "):
         others.check_equal(rows[0], "random", few)
     with pytest.raises(ResultsError, match="set must be one of hard_water, .*, got 'lake'"):
         others.check_complete([{**rows[0], "set": "lake"}], few)

@@ -10,7 +10,7 @@ import numpy as np
 from uuv_marl.baselines import POLICIES, make_policy
 from uuv_marl.benchmark.metrics import Metrics, MetricsRecorder
 from uuv_marl.envs.changes import Changes, ScenarioLike, changed
-from uuv_marl.errors import DivergenceError, PolicyError
+from uuv_marl.errors import USER_ERRORS, DivergenceError, PolicyError
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import whole_number
 from uuv_marl.sim.swarm import Swarm
@@ -109,7 +109,7 @@ def evaluate(
         ScenarioError: a change contradicts a requirement of the policy.
         DivergenceError: the integration step is too long for a vehicle.
     """
-    given = [*seeds]
+    given = [whole_number("seed", seed, 0) for seed in seeds]
     with blaming(policy):
         runs = [*episodes(changed(scenario, policy, **changes), policy, given)]
     return [{"seed": run.seed, **run.metrics} for run in sorted(runs, key=lambda run: given.index(run.seed))]
@@ -121,7 +121,7 @@ def blaming(policy: str) -> Generator[None]:
     try:
         yield
     except (TypeError, ValueError) as error:
-        if policy in POLICIES or isinstance(error, PolicyError):
+        if policy in POLICIES or isinstance(error, USER_ERRORS):
             raise
         raise PolicyError(f"policy {policy!r}: {error}") from error
 

@@ -184,8 +184,8 @@ def _band(series: Sequence[tuple[Float32, Float32]]) -> tuple[Float64, ...]:
     """Time, lowest, median and highest value, shape (time,) each, while more than half of the seeds run."""
     grid = np.arange(0.0, max(float(time[-1]) for time, _ in series), _GRID_S)
     curves = np.array([np.interp(grid, time, values, right=np.nan) for time, values in series])
-    sampled = np.isfinite(curves).sum(axis=0) > len(series) / 2
-    curves = curves[:, sampled]
+    most = np.isfinite(curves).sum(axis=0) > len(series) / 2
+    curves = curves[:, most]
     if not curves.size:
-        return grid[sampled], grid[sampled], grid[sampled], grid[sampled]
-    return grid[sampled], np.nanmin(curves, axis=0), np.nanmedian(curves, axis=0), np.nanmax(curves, axis=0)
+        return grid[most], grid[most], grid[most], grid[most]
+    return grid[most], np.nanmin(curves, axis=0), np.nanmedian(curves, axis=0), np.nanmax(curves, axis=0)

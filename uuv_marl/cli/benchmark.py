@@ -1,4 +1,4 @@
-"""``uuv-marl benchmark``, and ``tune``, which found the gains of what it compares."""
+"""``uuv-marl benchmark``, which compares policies, and ``uuv-marl tune``, which tunes controllers."""
 
 import functools
 import itertools

@@ -98,7 +98,7 @@ class TrainingFolder:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
             before, saved_versions = dict(config["scenarios"]), dict(config["versions"])
             self.until, training = float(config["until"]), Training(**config["training"])
-            scenarios_now = _read_by(training)
+            scenarios_now = _inputs(training)
         except (ScenarioError, PolicyError, TrainingError) as error:
             raise ResultsError(
                 f"the training in {self.path} can't be loaded here: {error}; resume it where it was started"
@@ -169,7 +169,7 @@ class TrainingFolder:
         """Prepare the folder for the next iteration, and write the settings, budget and versions."""
         config = {
             "training": self.training.model_dump(mode="json"),
-            "scenarios": _read_by(self.training),
+            "scenarios": _inputs(self.training),
             "until": until,
             "versions": versions(),
         }
@@ -232,7 +232,7 @@ def opened(path: Path, training: Training | None, say: Say = quiet) -> Iterator[
         yield folder
 
 
-def _read_by(training: Training) -> dict[str, Any]:
+def _inputs(training: Training) -> dict[str, Any]:
     """Inputs of a training beyond its description, by name: its scenarios, and the digest of an expert's file."""
     contents: dict[str, Any] = {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
     policy_type = policy_class(training.expert) if training.expert else None

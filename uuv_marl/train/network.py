@@ -77,8 +77,8 @@ class TorchActor:
         if not self.units:
             return self.network.output(z), z[:, :0]
         states: list[Tensor] = []
-        for gates, alike in zip(self.network.gates(z).split(x.shape[1]), continues[:, :, None], strict=True):
-            state = self.network.step(gates, state * alike)
+        for gates, carried in zip(self.network.gates(z).split(x.shape[1]), continues[:, :, None], strict=True):
+            state = self.network.step(gates, state * carried)
             states.append(state)
         after = torch.cat(states)
         return self.network.output(z, after), after

@@ -101,9 +101,8 @@ def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> P
             raise ScenarioError(f"axis {axis} has the levels {levels}, and none of them is to be run; give --level")
     planned = cells(plan)
     for cell in planned:
-        make_policy(
-            cell.case.policy, with_policy_requirements(cell.case.policy, cell.case.load())
-        )  # raises now, not after hours
+        # Raises now, not after hours.
+        make_policy(cell.case.policy, with_policy_requirements(cell.case.policy, cell.case.load()))
     suite = Suite(folder / "cells", traces=False)
     suite.run([cell.case for cell in planned], report, restart=restart)
     path = folder / EPISODES

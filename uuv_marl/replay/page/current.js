@@ -1,7 +1,7 @@
 /** The current: arrows at fixed places of the water, as long as it is fast. */
 import { label } from "./shapes.js";
 
-/** Length of an arrow of the speed that the key tells [px]. */
+/** Length of an arrow of the speed in the key [px]. */
 const ARROW = 22;
 /** Arrows are about this far apart [px], and get no longer than so many times ARROW. */
 const APART = 48;

@@ -1,4 +1,4 @@
-/** An episode, and what the page asks of it at any time: who is where, what was measured. */
+/** An episode, and its state at any time: positions and measurements. */
 export class Episode {
   /** @param decoded one of `decodeEpisodes`; its fields (policy, seed, events, arrays, ...) become this episode's. */
   constructor(decoded) {

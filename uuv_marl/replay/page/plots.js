@@ -20,7 +20,7 @@ export class Plots {
     this.time = 0;
   }
 
-  /** Make the plots anew, in the palette's colours and the place's width. */
+  /** Make the plots again, in the palette's colours and the place's width. */
   draw(palette) {
     this.plots.forEach((plot) => plot.destroy());
     this.place.replaceChildren();

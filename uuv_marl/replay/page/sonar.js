@@ -1,4 +1,4 @@
-/** What one vehicle detects: arrays and sub-sectors, the nearest in each, echoes, and the force it asked for. */
+/** What one vehicle detects: arrays and sub-sectors, the nearest in each, echoes, and its action. */
 
 const QUARTER = Math.PI / 2;
 
@@ -101,7 +101,7 @@ function drawEchoes(context, own, sectors, view, palette) {
   }
 }
 
-/** The force that the policy asks for, 60 px for full force. */
+/** The policy's action, 60 px for full force. */
 function drawForce(context, own, episode, inspected, sample, palette) {
   const action = episode.values("action");
   const at = 2 * (sample * episode.inspected.length + inspected);
