@@ -75,7 +75,7 @@ class Content(TypedDict):
 
     __pydantic_config__ = ConfigDict(strict=True, extra="forbid")  # pyright: ignore[reportGeneralTypeIssues]
 
-    schema: Literal[1]
+    schema: Literal[2]
     fingerprint: str
     versions: dict[str, str]
     machine: dict[str, str | int | None]
@@ -196,7 +196,7 @@ class Results:
         self._runs[scenario, policy, run.seed] = run.metrics
         self._untraced.discard((scenario, policy, run.seed))
         content = Content(
-            schema=1,
+            schema=2,
             fingerprint=self._fingerprint,
             versions=self._versions,
             machine={"platform": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
