@@ -54,7 +54,7 @@ def command(*arguments, output=None):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda data: data.update(schema=2), "schema"),
+        (lambda data: data.update(schema=1), "schema"),
         (lambda data: data.pop("policies"), "policies"),
         (lambda data: data.update(policies={}), "'idle', which is not described"),
         (lambda data: data.update(policies={"idle": {}}), "policies.idle"),
