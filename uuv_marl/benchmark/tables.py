@@ -40,7 +40,7 @@ _TASK_CAPTION = (
 )
 
 
-class Cells(NamedTuple):
+class RowCells(NamedTuple):
     """A policy's row of the table of ``follow``, a text for each of ``HEADERS``."""
 
     policy: str
@@ -63,7 +63,7 @@ class Table(NamedTuple):
 
     title: str
     headers: tuple[str, ...]
-    """``HEADERS`` for the task ``follow``, whose rows are ``Cells``."""
+    """``HEADERS`` for the task ``follow``, whose rows are ``RowCells``."""
     rows: Sequence[tuple[str, ...]]
     caption: str
 
@@ -94,7 +94,7 @@ def title(scenario: Scenario, seeds: Sequence[int]) -> str:
     )
 
 
-def _cells(scenario: Scenario, runs: Sequence[ResultRow], info: PolicyInfo) -> Cells:
+def _cells(scenario: Scenario, runs: Sequence[ResultRow], info: PolicyInfo) -> RowCells:
     """The row of a policy from its runs, at least one."""
     policy = runs[0].policy
     times, distances, spacings = (
@@ -103,7 +103,7 @@ def _cells(scenario: Scenario, runs: Sequence[ResultRow], info: PolicyInfo) -> C
     collisions = [run.metrics["collisions"] for run in runs]
     collided = sum(count > 0 for count in collisions)
     shares = [run.metrics["constraint_share"] for run in runs]
-    return Cells(
+    return RowCells(
         policy=policy,
         requirements=_requirements_text(scenario, policy, info),
         arrived=f"{len(times)}/{len(runs)}",
@@ -120,7 +120,7 @@ def _cells(scenario: Scenario, runs: Sequence[ResultRow], info: PolicyInfo) -> C
     )
 
 
-def _task_cells(cells: Cells, runs: Sequence[ResultRow], columns: Iterable[str]) -> tuple[str, ...]:
+def _task_cells(cells: RowCells, runs: Sequence[ResultRow], columns: Iterable[str]) -> tuple[str, ...]:
     """The row of a policy in the table of a task with measures of its own."""
     shares = _measured(runs, "success_share")
     return (
@@ -189,12 +189,12 @@ def terminal_table(table: Table, width: int) -> RichTable:
         for header in table.headers:
             out.add_column(escape(header), overflow="fold", width=widths.get(header))
     for row in table.rows:
-        cells = _stacked(Cells(*row), narrow) if stacked else row
+        cells = _stacked(RowCells(*row), narrow) if stacked else row
         out.add_row(*(escape(cell.replace(NOTHING, "-")) for cell in cells))  # a dash that every terminal has
     return out
 
 
-def _stacked(c: Cells, narrow: bool) -> tuple[str, ...]:
+def _stacked(c: RowCells, narrow: bool) -> tuple[str, ...]:
     """The cells of a row that fit a terminal; a narrow one omits intervals, the time mean and the shares of Eq. 7."""
     time, distance, spacing = (text.partition(" [")[0] if narrow else text for text in (c.time, c.distance, c.spacing))
     return (
