@@ -67,7 +67,7 @@ docs-links: .venv-docs/docs.stamp
 	$(SITE) -b linkcheck $(ARGS)
 
 # Little optimised, which compiles faster and moves no bit; what is compiled so stays out of the user's cache.
-BOUNDED := baselines bounds env few_informed hard_water nearby oracle reward sea sea_modem sea_sonar silent_targets sonar stopping swarm tasks traffic trajectory two_swarms vector_env vehicle
+BOUNDED := baselines bounds env few_informed hard_water nearby oracle reward disturbances disturbances_modem disturbances_sonar silent_targets sonar stopping swarm tasks traffic trajectory two_swarms vector_env vehicle
 test-bounds: .venv/dev.stamp
 	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 NUMBA_NUM_THREADS=1 UUV_MARL_CACHE_DIR=$(CURDIR)/.venv/bounds \
 	$(BIN)/python $(PYTEST) $(HALVES) $(BOUNDED:%=tests/test_%.py) $(ARGS)
