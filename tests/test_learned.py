@@ -289,3 +289,14 @@ def test_cards_that_say_nothing_sensible_are_refused(field, value, tmp_path):
     (tmp_path / "bad").write_bytes(safetensors.numpy.save(tensors(card), {"uuv_marl": said}))
     with pytest.raises(PolicyError, match=f"bad holds no policy of uuv_marl .its card's {field}"):
         make_policy(str(tmp_path / "bad"), load_scenario("tracking"))
+
+
+def test_the_hash_of_a_checkpoint_is_that_of_its_tensors_alone(tmp_path):
+    scenario, folders = load_scenario("starter"), [tmp_path / name for name in ("a", "b", "c")]
+    for folder in folders:
+        folder.mkdir()
+    plain, titled, other = (
+        load_checkpoint(saved(folder, scenario, scale, training={"title": title})).digest
+        for folder, scale, title in zip(folders, (0.3, 0.3, 0.2), ("", "another", ""), strict=True)
+    )
+    assert plain == titled != other

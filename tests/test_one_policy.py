@@ -26,7 +26,7 @@ KINDS = {
 
 @pytest.mark.parametrize("player", PLAYERS, ids=lambda player: player.__name__)
 @pytest.mark.parametrize("name", KINDS)
-@settings(max_examples=2, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(seed=st.integers(0, 2**40), pattern=st.integers(0, 2**32))
 def test_the_same_actions_through_every_interface(name, player, seed, pattern):
     scenario, overrides = KINDS[name]

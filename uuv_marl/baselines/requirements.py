@@ -67,5 +67,5 @@ def check_requirements(name: str, required: PolicyRequirements, scenario: Scenar
         own = " (add own_clock=true to the policy's name)" if late and scenario.timing.fixed else ""
         raise PolicyError(
             f"{name} needs {' and '.join(needs)}, which scenario {scenario.name!r} does not have; "
-            f"use uuv_marl.baselines.with_policy_requirements(policy, scenario){own}, or override these fields"
+            f"use an environment's for_policy, with_policy_requirements(name, scenario){own}, or override these fields"
         )

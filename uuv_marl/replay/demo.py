@@ -5,7 +5,7 @@ from pathlib import Path
 
 from uuv_marl.atomic import write_text
 from uuv_marl.paths import UserPath, user_path
-from uuv_marl.replay.page import html_of
+from uuv_marl.replay.html import html_of
 
 SCENARIO, SEED = "hard_water", 10_210
 POLICIES = ("bio_inspired", "tangent_bug", "mappo_hard_water")

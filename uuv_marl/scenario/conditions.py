@@ -26,8 +26,8 @@ def vehicle_disturbances(scenario: Scenario) -> list[str]:
 
 def sonar_is_ideal(scenario: Scenario) -> bool:
     """Whether sonar readings have no delay, noise or loss."""
-    deaf = any(fault.kind == "array" and fault.share > 0.0 for fault in scenario.faults)
-    return not deaf and not any([*_latency(scenario).values(), *_noise(scenario).values()])
+    failing = any(fault.kind == "array" and fault.share > 0.0 for fault in scenario.faults)
+    return not failing and not any([*_latency(scenario).values(), *_noise(scenario).values()])
 
 
 def _current(scenario: Scenario) -> dict[str, bool]:
