@@ -12,7 +12,7 @@ from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.names import parse_name
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.registry import POLICIES, PolicyType, is_trained, policy_class
-from uuv_marl.baselines.requirements import PolicyRequirements, check_requirements, inner_loop_nms, resolved_channels
+from uuv_marl.baselines.requirements import PolicyRequirements, inner_loop_nms, resolved_channels
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
 from uuv_marl.errors import ScenarioError, hint
@@ -93,7 +93,6 @@ def make_policy(
 def _made(name: str, scenario: Scenario, num_worlds: int, parameters: Mapping[str, object]) -> Policy:
     """The policy of a type with these parameters, its card's base controller, and the safety filter if named."""
     parsed, policy_type = parse_name(name), policy_class(name)
-    check_requirements(name, policy_type.requirements, scenario)
     values = {**parsed.parameters, **parameters}
     barrier = values.pop("barrier", GUARD) if parsed.safety_filter else GUARD
     if not isinstance(barrier, Barrier):
