@@ -431,8 +431,8 @@ def prepare(folder):
         app, ["benchmark", "--scenario", "starter", "--policy", "idle", "--seeds", "2", "--output", str(SOURCE_RESULTS)]
     )
     assert done.exit_code == 0, done.output
-    for name in ANYWHERE:
-        scenario = with_policy_requirements(name, load_scenario("single_obstacle"))
+    for name in POLICIES:
+        scenario = with_policy_requirements(name, load_scenario(TASKS_OF.get(name, "single_obstacle")))
         make_policy(name, scenario).act(Swarm(scenario).reset(0))
     for name in scenario_names():
         env = uuv_marl.parallel_env(load_scenario(name, overrides={"current.speed_mps": 0.1}))  # what the sea does, too
