@@ -12,7 +12,7 @@ from uuv_marl.sim.observation import Observe
 from uuv_marl.tasks.reward import RewardFunction
 
 ScenarioLike = UserPath | Scenario | Mapping[str, object]
-Reward = Literal["dense", "sparse", "team", "geodesic", "leader"] | RewardFunction
+Reward = Literal["dense", "sparse", "team", "first_arrival", "geodesic", "leader"] | RewardFunction
 
 
 class Changes(TypedDict, total=False):

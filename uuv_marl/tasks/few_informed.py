@@ -25,9 +25,7 @@ class FewInformedNumbers(ReachNumbers):
     """Number of vehicles that perceive l(t), sampled for each episode; all if there are fewer."""
 
 
-_TERMS = {
-    **Reach.rewards["dense"],
-    "arrival": "+w once, when the vehicle is first within near_m of l(t), which rests at its end",
+_OWN = {
     "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to l(t), perceived or not, D: "
     "progress_far_m, c: progress_m",
 }
@@ -45,7 +43,9 @@ class FewInformed(Reach):
     observed: ClassVar[FieldTable] = (
         PerceptField("informed", (1,), FLAG, "1 if the vehicle perceives l(t); 0 if its reference always reads 0"),
     )
-    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": _TERMS, "leader": _TERMS}
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "dense": {**Reach.rewards["dense"], **_OWN}, "leader": {**Reach.rewards["first_arrival"], **_OWN}
+    }  # fmt: skip
     headline: ClassVar[str] = "uninformed_share"
     columns: ClassVar[Mapping[str, str]] = {"uninformed_share": "share of the uninformed vehicles that succeed [1]"}
     reference_policy: ClassVar[str] = "leader_follower"

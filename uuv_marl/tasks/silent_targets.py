@@ -123,7 +123,7 @@ class SilentTargets(Reach):
     )
     channels: ClassVar[Mapping[str, FieldTable]] = {"path": PATH_FIELDS}
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
-        **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "arrival"},
+        **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "stay"},
         "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no "
         "nearer vehicle holds, 0 if there is none, D: progress_far_m, c: progress_m",
         "held": "+w_arrival · dt/T for each target that is held, to the vehicle nearest to it; T: the time limit",
@@ -261,15 +261,11 @@ class SilentTargets(Reach):
         }
 
     def reward(self, running: Bool) -> Terms:
-        """Progress and costs of ``reach``, and the term ``held`` in place of ``arrival``.
-
-        A policy without memory would leave after a reward that is given once.
-        """
+        """Progress and costs of ``reach``, and the term ``held`` in place of ``stay``."""
         share = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s
         away, nearest = self._nearest()
         num_held = ((away == nearest) & (nearest <= self.numbers.held_m)).sum(axis=2)
-        usual = {name: term for name, term in super().reward(running).items() if name in self.terms}
-        return {**usual, "held": self._weight.arrival * share[:, None] * num_held}
+        return {**super().reward(running), "held": self._weight.arrival * share[:, None] * num_held}
 
     def remaining_m(self) -> tuple[Float64, Float64]:
         """Distance to the nearest target that no nearer vehicle holds, now and before the step [m]."""

@@ -94,11 +94,6 @@ class TwoSwarms(Reach):
     Numbers = TwoSwarmsNumbers
     Memory: ClassVar[type[Any] | None] = TwoSwarmsMemory
     channels: ClassVar[Mapping[str, FieldTable]] = {"path": (*PATH_FIELDS, _RIGHT_OF_WAY)}
-    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
-        **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "arrival"},
-        "stay": "+w_arrival · dt/T while the vehicle is within near_m of its goal, and when all are, for the time that "
-        "is left until the limit T",
-    }}  # fmt: skip
     columns: ClassVar[Mapping[str, str]] = {
         "time_ratio": "mean over vehicles that reached their goals: time over that of the path at full speed [1]",
         "swarm_time_ratio": "the same of the last vehicle, if all reached their goals [1]",
@@ -188,17 +183,6 @@ class TwoSwarms(Reach):
             "path_walls": walls,
             "right_of_way": ((side > 0.0) | ~to_come.any(axis=1, keepdims=True))[:, :, None].astype(np.float64),
         }
-
-    def reward(self, running: Bool) -> Terms:
-        """Progress and costs of ``reach``, and the term ``stay`` in place of ``arrival``.
-
-        A policy without memory would leave after a reward that is given once.
-        """
-        swarm, period = self.swarm, self.swarm.scenario.timing.decision_period_s
-        left_s = swarm.time_limit_s - swarm.facts.time_s
-        share = np.where(self.done(), left_s + period, period) / swarm.time_limit_s
-        usual = {name: term for name, term in super().reward(running).items() if name in self.terms}
-        return {**usual, "stay": self._weight.arrival * share[:, None] * self.at_goal()}
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also the columns."""

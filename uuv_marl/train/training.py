@@ -110,7 +110,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     worlds, or with 0, each size gets about the same number of vehicles, ``ROWS`` in total."""
     reward: str | None = None
     """One of the task's rewards, ``team``, or your own ``module:function`` from the swarm after a decision to an array
-    (world, vehicle). If None: the task's first."""
+    (world, vehicle). The task's first if None, and in scenarios whose task does not have it."""
     critic: Literal["state", "own"] = "state"
     """Input of the critic beyond the vehicle's observation: ``state``, the true state of the world (MAPPO); ``own``,
     nothing (IPPO)."""
@@ -168,14 +168,15 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
             own = ":" in "".join([self.reward or "", *(each.task.name for each in self._scenarios.values())])
             ppo = self.ppo.model_copy(update={"collision_cost": (0.0, 0.0) if own else COLLISION_COST})
             object.__setattr__(self, "ppo", ppo)
+        known = dict.fromkeys(name for each in self._scenarios.values() for name in (*each.task_class.rewards, "team"))
+        if self.reward is not None and ":" not in self.reward and self.reward not in known:
+            tasks = ", ".join(dict.fromkeys(repr(each.task.name) for each in self._scenarios.values()))
+            raise TrainingError(
+                f"reward must be one of {', '.join(known)}, the rewards of task {tasks}, or module:function, "
+                f"got {self.reward!r}"
+            )
         for name, scenario in self._scenarios.items():
             refuse_losses(scenario, "training")
-            known = (*scenario.task_class.rewards, "team")
-            if self.reward is not None and ":" not in self.reward and self.reward not in known:
-                raise TrainingError(
-                    f"reward must be one of {', '.join(known)}, the rewards of task {scenario.task.name!r}, or "
-                    f"module:function, got {self.reward!r}"
-                )
             card = self._card(scenario)
             if differs := next((f for f in Card.model_fields if getattr(card, f) != getattr(self.card, f)), None):
                 raise TrainingError(
@@ -228,9 +229,10 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
 
     def reward_for(self, scenario: Scenario) -> Reward:
         """The reward on a scenario. Raises RewardError where it can't be imported."""
-        name = self.reward or next(iter(scenario.task_class.rewards))
+        first = next(iter(scenario.task_class.rewards))
+        name = self.reward or first
         if ":" not in name:
-            return cast(Reward, name)
+            return cast(Reward, name if name in (*scenario.task_class.rewards, "team") else first)
         try:
             function = named_object(name)
         except ImportError as error:
