@@ -33,6 +33,7 @@ POSITION = Quantity("m", 64.0, -MAX_RANGE_M, MAX_RANGE_M)
 LENGTH = Quantity("m", 64.0, 0.0, MAX_RANGE_M)
 SPEED = Quantity("m/s", 4.0, -MAX_SPEED, MAX_SPEED)
 YAW_RATE = Quantity("rad/s", 1.0, -MAX_SPEED, MAX_SPEED)
+ANGLE = Quantity("rad", 1.0, -math.pi, math.pi)
 FLAG = Quantity("1", 1.0, 0.0, 1.0)
 DIRECTION = Quantity("1", 1.0, -1.0, 1.0)
 AGE = Quantity("s", 1.0, 0.0, 4096.0)
@@ -59,6 +60,8 @@ class Fields(NamedTuple):
         Float32, "active 2", POSITION,
         "per active sub-sector: position of its centre, or of that surface point (sonar.echo_reports), else 0"]
     compass: Annotated[Float32, "2", DIRECTION, "cosine and sine of the heading from north", "compass"]
+    identity: Annotated[
+        Float32, "1", FLAG, "(own index + 1/2) over the number of vehicles, the same for all of an episode", "identity"]
     link_identity: Annotated[
         Float32, "sector", IDENTITY, "per sub-sector: 1 + index of the vehicle detected, else 0", "link"]
     link_velocity: Annotated[
@@ -96,8 +99,8 @@ FIELDS = {
     for name, annotated in get_type_hints(table, include_extras=True).items()
 }
 """Every field that a percept can have beside its task's, in order."""
-CHANNELS = tuple(dict.fromkeys(spec.channel for spec in FIELDS.values() if spec.channel))
-"""Names in ``sonar.channels`` that add fields."""
+CHANNELS = (*dict.fromkeys(spec.channel for spec in FIELDS.values() if spec.channel), "episode")
+"""Names in ``sonar.channels`` that add fields in every task; ``episode`` adds ``EPISODE``."""
 Starts = tuple[int, ...]
 """Index in a flat percept at which each of ``FIELDS`` starts, -1 where it is absent."""
 
@@ -118,6 +121,12 @@ class PerceptField(NamedTuple):
 
 FieldTable = tuple[PerceptField, ...]
 
+EPISODE: FieldTable = (
+    PerceptField("arrived", (1,), FLAG, "1 once the vehicle has had its reward for arriving, else 0"),
+    PerceptField("time_left", (1,), FLAG, "share of the time limit that is left"),
+)
+"""Fields of the channel ``episode``, which the task writes."""
+
 
 @functools.cache
 def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] = CHANNELS) -> FieldTable:
@@ -132,9 +141,9 @@ def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] =
 
 def task_fields(scenario: Scenario) -> FieldTable:
     """Fields that a scenario's task writes: those it always adds, and those of its channels in ``sonar.channels``."""
-    task, channels = scenario.task_class, scenario.sonar.channels
+    task, added = scenario.task_class, {"episode": EPISODE, **scenario.task_class.channels}
     rows: FieldTable = task.observed
-    return sum((added for name, added in task.channels.items() if name in channels), rows)
+    return sum((fields for name, fields in added.items() if name in scenario.sonar.channels), rows)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,7 +13,8 @@ from uuv_marl.scenario import fields
 from uuv_marl.scenario.fields import Lag, NonNegative, NonPositive, Positive, Radius, Section, Signed, Speed, within
 
 MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0  # widths of sub-sectors that the sonar's table of directions supports
-CHANNEL_NAMES = ("compass", "link", "current", "age", "ranged", "modem")  # channels of every task
+CHANNEL_NAMES = ("compass", "identity", "link", "current", "age", "ranged", "modem", "episode")
+"""Channels of every task."""
 
 
 class Vehicle(Section):
@@ -179,9 +180,10 @@ class Sonar(Section):
     obstacles_hide_vehicles: bool
     """Whether an obstacle on the line of sight hides a vehicle."""
     channels: tuple[str, ...]
-    """Observations beyond the percept: ``compass`` (heading), ``link`` (neighbours' true identity and velocity),
-    ``modem`` (the same from their latest messages), ``current`` (own velocity over ground and through the water),
-    ``age`` (of each sub-sector's reading), ``ranged`` (whether its range was measured), and those of the task."""
+    """Observations beyond the percept: ``compass`` (heading), ``identity`` (a number of the vehicle's own), ``link``
+    (neighbours' true identity and velocity), ``modem`` (the same from their latest messages), ``current`` (own velocity
+    over ground and through the water), ``age`` (of each sub-sector's reading), ``ranged`` (whether its range was
+    measured), ``episode`` (whether the reward for arriving was paid, and the time left), and those of the task."""
     arrays: Annotated[tuple[SonarArray, ...], Field(min_length=1)]
     """The arrays, in the order of sub-sectors in the percept."""
 

@@ -83,6 +83,8 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
             see.link_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
     if see.compass.shape[2] > 0:
         see.compass[w, i, 0], see.compass[w, i, 1] = c, s
+    if see.identity.shape[2] > 0:
+        see.identity[w, i, 0] = (i + 0.5) / see.identity.shape[1]
     obstacles, num = obstacle_columns(workspace.obstacles), world_map.num_obstacles[w]
     if num > MOST_NEARBY:
         l_x, l_y, u_x, u_y = model.suite.cone

@@ -308,7 +308,7 @@ class Swarm:
         """Write the task's fields into the percepts of the living of these worlds, shape (world,)."""
         if not self.task_fields:
             return
-        rows, percept, observing = self.task.observe(worlds), self.percept, worlds[:, None] & self.state.alive
+        rows, percept, observing = self.task.fields(worlds), self.percept, worlds[:, None] & self.state.alive
         for field in self.task_fields:
             percept[field.name][observing] = np.clip(
                 rows[field.name][observing], field.quantity.low, field.quantity.high

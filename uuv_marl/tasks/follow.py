@@ -13,6 +13,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from uuv_marl.percept import AGE, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Facts, State
 from uuv_marl.sim.compiled import compiled
@@ -85,6 +86,20 @@ class Follow(Task):
     def at_goal(self) -> Bool:
         """All vehicles of a swarm that has arrived: the paper defines success for the swarm."""
         return np.broadcast_to(self.swarm.arrived[:, None], self.swarm.state.alive.shape)
+
+    def arrived_before(self) -> Bool:
+        """All vehicles of a swarm that has arrived."""
+        return self.at_goal()
+
+    @classmethod
+    def state_fields(cls, scenario: Scenario) -> FieldTable:
+        """Also for how long the swarm has been together at the end."""
+        return *super().state_fields(scenario), PerceptField("dwell", (1,), AGE, "time in arrival.spread_m")
+
+    def state(self) -> Terms:
+        """The values of ``state_fields``."""
+        dwell = self.swarm.state.dwell[:, :1] * self.swarm.scenario.timing.control_step_s
+        return {**super().state(), "dwell": dwell}
 
     def arrived(self, world: int) -> bool:
         """Whether the swarm has arrived."""

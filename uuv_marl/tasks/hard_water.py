@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import AfterValidator
 
-from uuv_marl.percept import FieldTable
+from uuv_marl.percept import LENGTH, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.scenario.fields import Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -240,6 +240,18 @@ class HardWater(Reach):
         path, walls = np.zeros((*shape, 2)), np.zeros((*shape, NUM_WALLS, 2))
         write_path(swarm.state, swarm.world_map, swarm.heading, memory.turn, memory.path_cost, self._grid, path, walls)
         return {"path": path, "path_length": self.path_lengths()[:, :, None], "path_walls": walls}
+
+    @classmethod
+    def state_fields(cls, scenario: Scenario) -> FieldTable:
+        """Also the length of each vehicle's path."""
+        meaning = "per vehicle: length of the collision-free path to the goal"
+        return *super().state_fields(scenario), PerceptField(
+            "path_length", (scenario.swarm.num_vehicles,), LENGTH, meaning
+        )
+
+    def state(self) -> Terms:
+        """The values of ``state_fields``."""
+        return {**super().state(), "path_length": self.path_lengths()}
 
     def move(self, running: Bool) -> None:  # noqa: ARG002
         """Note the lengths of paths, from which the reward ``geodesic`` takes progress."""

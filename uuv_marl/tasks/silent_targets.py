@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.percept import DIRECTION, FieldTable, PerceptField
+from uuv_marl.percept import ANGLE, DIRECTION, LENGTH, SPEED, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Positive, Section, within
 from uuv_marl.scenario.vehicle_checks import top_speed
@@ -259,6 +259,24 @@ class SilentTargets(Reach):
             "path_length": np.sqrt(x * x + y * y)[:, :, None],
             "path_walls": walls,
         }
+
+    @classmethod
+    def state_fields(cls, scenario: Scenario) -> FieldTable:
+        """Also the targets' motion, and the distances from which progress is counted."""
+        n, m = scenario.swarm.num_vehicles, scenario.task_numbers.targets
+        return (
+            *super().state_fields(scenario),
+            PerceptField("remaining", (n,), LENGTH, "per vehicle: distance to a target that no nearer one holds, or 0"),
+            PerceptField("target_velocity", (m, 2), SPEED, "per target: its velocity, north and east"),
+            PerceptField("target_turn", (m,), ANGLE, "per target: what is left of its turn, clockwise"),
+        )
+
+    def state(self) -> Terms:
+        """The values of ``state_fields``."""
+        memory = self.memory
+        velocity = memory.speed[:, :, None] * np.stack([np.cos(memory.heading), np.sin(memory.heading)], axis=2)
+        own = {"remaining": memory.remaining_m, "target_velocity": velocity, "target_turn": memory.to_turn}
+        return {**super().state(), **own}
 
     def reward(self, running: Bool) -> Terms:
         """Progress and costs of ``reach``, and the term ``held`` in place of ``stay``."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.percept import CHANNELS, FieldTable, percept_table
+from uuv_marl.percept import CHANNELS, FLAG, FieldTable, PerceptField, percept_table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Section
 from uuv_marl.sim.episode_setup import EpisodeSetup, default_setup
@@ -124,6 +124,30 @@ class Task(RequiredMethods):
         """Fields of ``observed`` and ``channels`` by name, in physical units, shape (world, vehicle, ...)."""
         return {}
 
+    def fields(self, running: Bool) -> Terms:
+        """``observe``, and the fields of the channel ``episode`` where ``sonar.channels`` has it."""
+        if "episode" not in self.swarm.scenario.sonar.channels:
+            return self.observe(running)
+        left = np.maximum(1.0 - self.swarm.facts.time_s / self.swarm.time_limit_s, 0.0)[:, None, None]
+        arrived = self.arrived_before()[:, :, None]
+        return {
+            **self.observe(running), "arrived": arrived.astype(np.float64),
+            "time_left": np.broadcast_to(left, arrived.shape),
+        }  # fmt: skip
+
+    @classmethod
+    def state_fields(cls, scenario: Scenario) -> FieldTable:
+        """Fields that the task adds to the global state (``uuv_marl.envs.state``).
+
+        With the state's other fields they determine the reward of the coming step, but for what is random.
+        """
+        meaning = "per vehicle: 1 once it has had its reward for arriving"
+        return (PerceptField("arrived", (scenario.swarm.num_vehicles,), FLAG, meaning),)
+
+    def state(self) -> Terms:
+        """The values of ``state_fields`` by name, shape (world, *shape) each."""
+        return {"arrived": self.arrived_before().astype(np.float64)}
+
     def step_reward(self, running: Bool, *, keep_terms: bool = True) -> StepReward:  # noqa: ARG002
         """The reward of the coming step from ``reward``; a task with compiled code for it overrides this.
 
@@ -161,7 +185,7 @@ class Task(RequiredMethods):
         return self.swarm.facts.away
 
     def arrived_before(self) -> Bool:
-        """Vehicles that have had the reward for their arrival, shape (world, vehicle), for critics."""
+        """Vehicles that have had the reward for their arrival, shape (world, vehicle)."""
         return np.zeros_like(self.swarm.state.alive)
 
     def teams(self, world: int) -> Int64:
