@@ -67,7 +67,7 @@ def test_advantages_by_hand():
 class Toy:
     """Rows that see noise and are paid by a function of (observation, action); all end every ``length`` steps."""
 
-    features, size, rows = 2, 3, 64
+    features, size, rows, part = 2, 3, 64, np.zeros(64, np.int64)
 
     def __init__(self, pay, length=1, cut_off=False):
         self._pay, self._length, self._cut_off, self._t = pay, length, cut_off, 0
@@ -91,6 +91,7 @@ class Toy:
             reward=reward,
             terminated=none if self._cut_off else over,
             truncated=over if self._cut_off else none,
+            acted=~none,
             final=self.observation[over] if self._cut_off else self.observation[none],
         )
 
@@ -117,7 +118,7 @@ class Recall(Toy):
 
 def learner_for(problem, by, made=None, seed=0):
     made, sizes = made or Architecture(hidden=(32,)), [("seen", problem.features)]
-    return Learner(made, sizes, problem.size, problem.rows, by, np.random.default_rng(seed))
+    return Learner(made, sizes, problem.size, problem.part, by, np.random.default_rng(seed))
 
 
 def learned(problem, iterations, by, made=None):
@@ -128,6 +129,54 @@ def learned(problem, iterations, by, made=None):
         learner.update(batch, annealed((0.4, 0.1), share), annealed((3e-3, 5e-4), share))
         rewards.append(reward)
     return learner, rewards
+
+
+def updated(change, memory):
+    """A learner's arrays after an update on a batch that ``change`` has replaced."""
+    problem = Toy(lambda x, a: x[:, 0] * a[:, 1], 4)
+    problem.part = np.arange(64) % 2
+    made = Architecture(hidden=(32,), memory=memory)
+    learner = learner_for(problem, Ppo(horizon=8), made)
+    batch, _ = learner.sample(problem, 0.4)
+    learner.update(change(batch), 0.4, 1e-3)
+    return learner.arrays()
+
+
+@pytest.mark.parametrize("memory", [False, True])
+def test_rows_of_lost_vehicles_change_nothing(memory):
+    """What lost vehicles do and are paid has no effect on an update."""
+
+    def lost(garbage):
+        def change(batch):
+            at = torch.arange(64) % 5 == 0
+            acted = batch.acted.clone()
+            acted[3:, at] = 0.0
+            own = {}
+            for name in ("action", "mean", "advantage", "returns"):
+                own[name] = getattr(batch, name).clone()
+                own[name][3:, at] = garbage
+            return batch._replace(acted=acted, **own)
+
+        return change
+
+    (one, other), whole = (
+        (updated(lost(garbage), memory) for garbage in (0.0, 50.0)),
+        updated(lambda batch: batch, memory),
+    )
+    assert all((one[name] == other[name]).all() for name in one)
+    assert any((one[name] != whole[name]).any() for name in one)
+
+
+@pytest.mark.parametrize("memory", [False, True])
+def test_an_update_does_not_depend_on_the_scale_of_a_parts_reward(memory):
+    """Advantages and returns are normalised in each part, so that none outweighs another."""
+
+    def scaled(batch):
+        factor = torch.where(batch.part == 1, 1000.0, 1.0)
+        return batch._replace(advantage=batch.advantage * factor, returns=batch.returns * factor)
+
+    one, other = updated(lambda batch: batch, memory), updated(scaled, memory)
+    assert all(np.allclose(one[name], other[name], atol=2e-4) for name in one if name != "moments")
 
 
 def test_a_one_step_task_is_solved():
@@ -185,7 +234,7 @@ def test_values_of_a_steady_income(cut_off, values):
     by = Ppo(horizon=16, gamma=0.9, value_decay=0.9)
     learner, _ = learned(Toy(lambda observation, _: np.ones(len(observation)), 4, cut_off), 80, by)
     x = np.random.default_rng(2).uniform(-1, 1, (200, 3)).astype(np.float32)
-    value = learner.value(torch.from_numpy(x), torch.zeros(200, 0)).mean()
+    value = learner.value(torch.from_numpy(x), torch.zeros(200, 0), torch.zeros(200, dtype=torch.int64)).mean()
     assert value == pytest.approx(10.0 if cut_off else 2.33, rel=0.05)
     assert values[0] * 0.95 < value < values[1] * 1.05
 
@@ -215,7 +264,7 @@ def test_a_memory_is_trained_from_where_it_was():
 class Mixed(Toy):
     """Rows of which the fifth ends, and the third and the fourth are cut off, each in a step of its own."""
 
-    features, size, rows = 2, 3, 6
+    features, size, rows, part = 2, 3, 6, np.zeros(6, np.int64)
     ends, cuts = ((1, 4),), ((1, 2), (2, 3))
 
     def step(self, action):
@@ -227,7 +276,7 @@ class Mixed(Toy):
         for t, row in self.cuts:
             cut[row] |= t == k
         self.finals = self._rng.uniform(-1, 1, (int(cut.sum()), self.size)).astype(np.float32)
-        return Transition(np.ones(self.rows, np.float32), ended, cut, self.finals)
+        return Transition(np.ones(self.rows, np.float32), ended, cut, np.ones(self.rows, np.bool_), self.finals)
 
 
 def test_what_would_have_come_after_a_cut_counts_as_the_memory_would_have_seen_it():
@@ -235,22 +284,22 @@ def test_what_would_have_come_after_a_cut_counts_as_the_memory_would_have_seen_i
     nothing where the episode ended."""
     problem = Mixed(None)
     learner = learner_for(problem, Ppo(horizon=4, gae_lambda=0.0), Architecture(memory=True, hidden=(5,)))
-    learner.value = lambda seen, state: (seen[:, 2] + 10.0 * state.sum(1)).numpy()
+    learner.value = lambda seen, state, part: (seen[:, 2] + 10.0 * state.sum(1)).numpy()
     finals, step = [], problem.step
     problem.step = lambda action: (step(action), finals.append(problem.finals))[0]
     batch, _ = learner.sample(problem, 0.3)
     state = torch.zeros(6, 5)
     for t in range(4):
         state = learner.act(batch.observation[t], state)[1]
-        value = learner.value(batch.observation[t], state)
+        value = learner.value(batch.observation[t], state, batch.part[t])
         after = torch.from_numpy(problem.observation) if t == 3 else batch.observation[t + 1]
         cut, ended = [row for k, row in problem.cuts if k == t], [row for k, row in problem.ends if k == t]
         fresh = state.clone()
         fresh[cut + ended] = 0.0
-        ahead = learner.value(after, learner.act(after, fresh)[1])
+        ahead = learner.value(after, learner.act(after, fresh)[1], batch.part[t])
         if cut:
             final = torch.from_numpy(finals[t])
-            ahead[cut] = learner.value(final, learner.act(final, state[cut])[1])
+            ahead[cut] = learner.value(final, learner.act(final, state[cut])[1], batch.part[t][cut])
         ahead[ended] = 0.0
         np.testing.assert_allclose(batch.advantage[t], 1.0 + 0.99 * ahead - value, atol=1e-4)
         state = fresh
@@ -395,6 +444,21 @@ def test_one_network_learns_on_several_scenarios(tmp_path):
     assert record.agent_steps == 12 * TINY.horizon
     assert list(resume(tmp_path / "run")) == []
     assert trainings.best_of(tmp_path / "run")[1].startswith("uuv-marl replay --scenario")
+
+
+def test_lost_vehicles_are_rows_that_do_not_act(tmp_path, no_validation):
+    losing = {"losses.times_s": [1.0, 1.5], "time_limit.factor": 0.001, "time_limit.extra_s": 3.0}
+    training = Training(scenario="starter", overrides=losing, sizes=[(4, 2)], steps=1, ppo=TINY)
+    env = rows_for(training)
+    acted, ended = [], []
+    for _ in range(7):
+        transition = env.step(np.zeros((8, 2), np.float32))
+        acted.append(transition.acted)
+        ended.append(transition.terminated | transition.truncated)
+    np.testing.assert_array_equal(np.sum(acted, axis=1), [8, 8, 6, 4, 4, 4, 4])
+    np.testing.assert_array_equal(np.sum(ended, axis=1), [0, 2, 2, 0, 0, 0, 8])
+    (record,) = train(tmp_path / "run", training)
+    assert record.agent_steps < 8 * TINY.horizon
 
 
 def test_a_critic_that_sees_its_own_alone_has_the_actors_input():
@@ -921,10 +985,8 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
             {"imitation_weight": 2.0},
             "imitation_weight = 2 needs an expert, and none is given; name one, or leave it out",
         ),
-        ({"scenario": "lossy"}, "training can't represent the loss of a vehicle"),
         ({"sizes": [0]}, "sizes.0.0 must be greater than or equal to 1, got 0"),
         ({"sizes": [[5, -1]]}, "sizes.0.1 must be greater than or equal to 0, got -1"),
-        ({"extra_scenarios": ["lossy"]}, "training can't represent the loss of a vehicle"),
         (
             {"extra_scenarios": ["few_informed"]},
             "extra_scenarios has 'few_informed' with another percept than 'starter', and one network",

@@ -7,7 +7,7 @@ learned. Training uses one thread, so a seed determines it bit for bit. Needs ``
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,34 +52,41 @@ class Rollout(NamedTuple):
     returns: Tensor
     continues: Tensor
     """0 where an episode begins, else 1."""
+    acted: Tensor
+    """1 for vehicles that acted, 0 for those that were lost before."""
+    part: Tensor
+    """Index of the row's part of the training."""
     state: Tensor
     """Recurrent state before the first decision, shape (row, unit)."""
 
 
 class Learner:
-    """Actor, critic, their optimiser, the scale of returns, and the recurrent state of each row.
+    """Actor, critic, their optimiser, the scale of returns in each part, and the recurrent state of each row.
 
     Args:
         architecture: of the actor's network.
         sizes: fields of the actor's observation.
         size: number of the critic's inputs, of which the first are the actor's.
-        rows: number of vehicles.
+        part: index of each vehicle's part of the training, shape (row,). Returns and advantages are normalised in each
+            part, and the critic has an output for each.
         config: hyperparameters.
         rng: for initial weights, noise, and the order of samples.
     """
 
     def __init__(
-        self, architecture: Architecture, sizes: Sizes, size: int, rows: int, config: Ppo, rng: np.random.Generator
-    ) -> None:
+        self, architecture: Architecture, sizes: Sizes, size: int, part: NDArray[np.int64], config: Ppo,
+        rng: np.random.Generator,
+    ) -> None:  # fmt: skip
         self.config, self._rng, self._features = config, rng, sum(size for _, size in sizes)
         self.actor = TorchActor(architecture, sizes, rng)
-        wide = (size + self.actor.units, *_CRITIC, 1)
-        self.critic = [started(shape, rng, math.sqrt(2.0) if shape[-1] > 1 else 1.0)
-                       for a, b in itertools.pairwise(wide) for shape in ((a, b), (b,))]  # fmt: skip
+        self._part, num_parts = torch.from_numpy(part), int(part.max()) + 1
+        wide = (size + self.actor.units, *_CRITIC, num_parts)
+        layers = zip(itertools.pairwise(wide), [math.sqrt(2.0)] * len(_CRITIC) + [1.0], strict=True)
+        self.critic = [started(shape, rng, gain) for (a, b), gain in layers for shape in ((a, b), (b,))]
         self._parts = (list(self.actor.tensors.values()), self.critic)
         self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
-        self._moments = np.zeros(3)  # running weight, sum and sum of squares of returns
-        self.state = torch.zeros(rows, self.actor.units)
+        self._moments = np.zeros((3, num_parts))  # running weight, sum and sum of squares of returns
+        self.state = torch.zeros(len(part), self.actor.units)
         self.imitating = False
         """Whether the actor imitates an expert instead of maximising reward."""
         self.imitation_weight = 0.0
@@ -91,19 +98,19 @@ class Learner:
             self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
         self.imitating, self.imitation_weight = imitating, imitation_weight
 
-    def _critic_output(self, x: Tensor, state: Tensor) -> Tensor:
-        """Normalised values (row,) of the critic's inputs (row, entry) and the recurrent state."""
+    def _critic_output(self, x: Tensor, state: Tensor, part: Tensor) -> Tensor:
+        """Normalised values (row,) of the critic's inputs (row, entry), recurrent states and parts of the training."""
         x = torch.cat([x, state], 1)
         for k in range(0, len(self.critic), 2):
             x = torch.addmm(self.critic[k + 1], x, self.critic[k])
             x = x if k == len(self.critic) - 2 else torch.tanh(x)
-        return x[:, 0]
+        return x.gather(1, part[:, None])[:, 0]
 
     @torch.no_grad()
-    def value(self, seen: Tensor, state: Tensor) -> Float32:
+    def value(self, seen: Tensor, state: Tensor, part: Tensor) -> Float32:
         """Expected returns, shape (row,)."""
         mean, std = self._scale()
-        return self._critic_output(seen, state).numpy() * np.float32(std) + np.float32(mean)
+        return (self._critic_output(seen, state, part) * std[part] + mean[part]).numpy()
 
     @torch.no_grad()
     def act(self, seen: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
@@ -117,6 +124,7 @@ class Learner:
         action, mean, expert_action = torch.empty((3, *shape, 2))
         states = torch.empty((config.horizon + 1, env.rows, self.actor.units))
         reward, ended = np.empty(shape, np.float32), np.zeros((config.horizon + 1, env.rows), np.bool_)
+        acted = torch.empty(shape)
         mean_reward, first = 0.0, self.state
         for t in range(config.horizon):
             observation[t] = torch.from_numpy(env.observation)
@@ -129,32 +137,39 @@ class Learner:
             transition = env.step(action[t].numpy())
             mean_reward += float(transition.reward.mean()) / config.horizon
             reward[t], ended[t + 1] = transition.reward, transition.terminated | transition.truncated
+            acted[t] = torch.from_numpy(transition.acted)
             if len(transition.final):
-                seen = torch.from_numpy(transition.final)
-                after = self.act(seen, states[t][torch.from_numpy(transition.truncated)])[1]
-                reward[t][transition.truncated] += np.float32(config.gamma) * self.value(seen, after)
+                seen, cut = torch.from_numpy(transition.final), torch.from_numpy(transition.truncated)
+                value = self.value(seen, self.act(seen, states[t][cut])[1], self._part[cut])
+                reward[t][transition.truncated] += np.float32(config.gamma) * value
             self.state = states[t] * torch.from_numpy(~ended[t + 1, :, None])
         observation[-1] = torch.from_numpy(env.observation)
         states[-1] = self.act(observation[-1], self.state)[1]
-        rows = observation.flatten(0, 1), states.flatten(0, 1)
+        part = self._part.expand(config.horizon + 1, -1)
+        rows = observation.flatten(0, 1), states.flatten(0, 1), part.flatten()
         value = self.value(*rows).reshape(config.horizon + 1, -1)
         advantage = gae(reward, value, ended[1:], config.gamma, config.gae_lambda)
         continues = torch.from_numpy(~ended[:-1]).float()
-        arrays = torch.from_numpy(advantage), torch.from_numpy(advantage + value[:-1])
-        return Rollout(observation[:-1], action, mean, expert_action, *arrays, continues, first), mean_reward
+        arrays = torch.from_numpy(advantage), torch.from_numpy(advantage + value[:-1]), continues, acted, part[:-1]
+        return Rollout(observation[:-1], action, mean, expert_action, *arrays, first), mean_reward
 
     def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
         """Train actor and critic on a batch: by PPO, or by imitation of the expert."""
         self._optimiser.param_groups[0]["lr"] = learning_rate
-        error = (batch.advantage.var() / batch.returns.var().clamp(min=1e-12)).item()
-        self._follow(batch.returns.double())
-        spread = batch.advantage.std(correction=0) + 1e-8
-        batch = batch._replace(advantage=(batch.advantage - batch.advantage.mean()) / spread)
+        acted = batch.acted > 0.0
+        error = (batch.advantage[acted].var() / batch.returns[acted].var().clamp(min=1e-12)).item()
+        chosen = [acted & (batch.part == k) for k in range(len(self._moments[0]))]
+        self._follow([batch.returns[rows].double() for rows in chosen])
+        advantage = torch.zeros_like(batch.advantage)
+        for rows in chosen:
+            own = batch.advantage[rows]
+            advantage[rows] = (own - own.mean()) / (own.std(correction=0) + 1e-8)
+        mean, std = self._scale()
+        batch = batch._replace(advantage=advantage, returns=(batch.returns - mean[batch.part]) / std[batch.part])
         if not self.actor.units:  # without a memory, samples of all times are shuffled
-            mixed = {name: x.reshape(1, -1, *x.shape[2:]) for name, x in batch._asdict().items() if name != "state"}
-            batch = Rollout(**mixed, state=torch.zeros(batch.action[..., 0].numel(), 0))
-        (mean, std), kl = self._scale(), 0.0
-        batch = batch._replace(returns=(batch.returns - mean) / std)
+            mixed = {name: x[acted][None] for name, x in batch._asdict().items() if name != "state"}
+            batch = Rollout(**mixed, state=torch.zeros(int(acted.sum()), 0))
+        kl = 0.0
         for _ in range(_IMITATION_EPOCHS if self.imitating else self.config.epochs):
             order = torch.from_numpy(self._rng.permutation(batch.action.shape[1]))
             divergences = [self._descend(batch, rows, noise) for rows in order.chunk(self.config.minibatches)]
@@ -165,40 +180,43 @@ class Learner:
 
     def _descend(self, batch: Rollout, rows: Tensor, noise: float) -> float:
         """One gradient step on some rows; the divergence from the policy that sampled, or from the expert."""
-        x, action, old, expert_action, advantage, returns, continues = (
-            array.index_select(1, rows) for array in batch[:7]
+        x, action, old, expert_action, advantage, returns, continues, acted, part = (
+            array.index_select(1, rows) for array in batch[:9]
         )
         new, states = self.actor.through(x[:, :, : self._features], batch.state[rows], continues)
-        action, old, advantage = action.reshape(-1, 2), old.reshape(-1, 2), advantage.reshape(-1)
+        action, old, expert_action = (array.reshape(-1, 2) for array in (action, old, expert_action))
+        weight, advantage, part = acted.reshape(-1) / acted.sum(), advantage.reshape(-1), part.reshape(-1)
         double = 2.0 * noise * noise
         ratio = (((action - old).square() - (action - new).square()).sum(-1) / double).exp()
         clipped = ratio.clamp(1.0 - self.config.clip, 1.0 + self.config.clip)
-        apart = (new - (expert_action.reshape(-1, 2) if self.imitating else old)).square().sum(-1).mean()
-        loss = apart if self.imitating else -torch.minimum(ratio * advantage, clipped * advantage).mean()
+        apart = weight @ (new - (expert_action if self.imitating else old)).square().sum(-1)
+        loss = apart if self.imitating else -weight @ torch.minimum(ratio * advantage, clipped * advantage)
         if self.imitation_weight:
-            loss = loss + self.imitation_weight * (new - expert_action.reshape(-1, 2)).square().sum(-1).mean()
-        prediction = self._critic_output(x.reshape(-1, x.shape[2]), states.detach())
+            loss = loss + self.imitation_weight * (weight @ (new - expert_action).square().sum(-1))
+        prediction = self._critic_output(x.reshape(-1, x.shape[2]), states.detach(), part)
         self._optimiser.zero_grad()
-        (loss + (prediction - returns.reshape(-1)).square().mean()).backward()
+        (loss + weight @ (prediction - returns.reshape(-1)).square()).backward()
         for part in self._parts:
             nn.utils.clip_grad_norm_(part, self.config.max_gradient)
         self._optimiser.step()
         return apart.item() / double
 
-    def _scale(self) -> tuple[float, float]:
-        """Running mean and standard deviation of returns; 0 and 1 at first."""
+    def _scale(self) -> tuple[Tensor, Tensor]:
+        """Running mean and standard deviation of returns in each part, shape (part,); 0 and 1 at first."""
         weight, total, squares = self._moments
-        if weight == 0.0:
-            return 0.0, 1.0
-        mean = total / weight
-        return float(mean), math.sqrt(max(squares / weight - mean * mean, 1e-4))
+        begun = np.maximum(weight, 1e-12)
+        mean = total / begun
+        std = np.where(weight > 0.0, np.sqrt(np.maximum(squares / begun - mean * mean, 1e-4)), 1.0)
+        return torch.from_numpy(mean).float(), torch.from_numpy(std).float()
 
     @torch.no_grad()
-    def _follow(self, returns: Tensor) -> None:
-        """Update the scale of returns, and preserve the critic's values (PopArt, Hessel et al. 2019)."""
+    def _follow(self, returns: Sequence[Tensor]) -> None:
+        """Update the scale of each part's returns, and preserve the critic's values (PopArt, Hessel et al. 2019)."""
         first, (mean, std), decay = not self._moments.any(), self._scale(), self.config.value_decay
-        fresh = np.array([1.0, returns.mean().item(), returns.square().mean().item()])
-        self._moments = decay * self._moments + (1.0 - decay) * fresh
+        for k, own in enumerate(returns):
+            if len(own):
+                fresh = np.array([1.0, own.mean().item(), own.square().mean().item()])
+                self._moments[:, k] = decay * self._moments[:, k] + (1.0 - decay) * fresh
         new_mean, new_std = self._scale()
         if not first:
             self.critic[-2].mul_(std / new_std)

@@ -31,9 +31,11 @@ class Transition(NamedTuple):
 
     reward: Float32
     terminated: Bool
-    """Whether the task has ended."""
+    """Whether the task has ended, or the vehicle was lost."""
     truncated: Bool
     """Whether the episode was cut off."""
+    acted: Bool
+    """Whether the vehicle acted: it was not lost before."""
     final: Float32
     """Final inputs of the critic in the truncated rows, shape (truncated row, entry)."""
 
@@ -89,9 +91,10 @@ class Group:
         expert_action = cast(Policy, self._expert).act(self.env.swarm.percept).reshape(-1, 2).copy()
         return expert_action, np.where(np.repeat(self._expert_acts, self._shape[1])[:, None], expert_action, action)
 
-    def step(self, action: Float32, seeds: Seeds) -> tuple[Float32, Bool, Bool, Float32, Float32]:
-        """Reward, terminated and truncated by row, the critic's inputs, and its final ones in truncated rows."""
+    def step(self, action: Float32, seeds: Seeds) -> tuple[Transition, Float32]:
+        """The transition of the group's rows, and the critic's inputs."""
         env, n = self.env, self._shape[1]
+        acted = env.swarm.state.alive.reshape(-1).copy()
         action = action.copy()
         bound(action, in_disc(self._network_action))
         action = action.reshape(*self._shape, 2)
@@ -101,13 +104,15 @@ class Group:
         if self._expert is not None:
             self._expert.record_action(action)
         result = env.step(action)
-        reward = result.reward - self.collision_cost * env.swarm.facts.vehicle_collisions
+        reward = (result.reward - self.collision_cost * env.swarm.facts.vehicle_collisions).reshape(-1)
         done, cut = np.repeat(result.world_terminated, n), np.repeat(result.world_truncated, n)
+        done |= env.swarm.facts.lost.reshape(-1)
+        cut &= ~done
         observation, over = result.observation, np.flatnonzero(result.over)
-        final = self.seen(observation)[cut] if cut.any() else np.zeros((0, 0), np.float32)
+        final = self.seen(observation)[cut] if cut.any() else np.zeros((0, len(self.seen(observation)[0])), np.float32)
         if len(over):
             observation = self.start([int(seed) for seed in seeds(len(over))], over.tolist())
-        return reward.reshape(-1).astype(np.float32), done, cut, self.seen(observation), final
+        return Transition(reward.astype(np.float32), done, cut, acted, final), self.seen(observation)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """The state for ``restore``, without observations."""
@@ -139,6 +144,8 @@ class Rows:
         self.groups = [Group(training, part) for part in training.parts]
         ends = np.cumsum([0, *(part.vehicles * part.worlds for part in training.parts)]).tolist()
         self._rows = [slice(first, end) for first, end in itertools.pairwise(ends)]
+        self.part = np.repeat(np.arange(len(self._rows)), np.diff(ends))
+        """Index of the part of the training to which each row belongs, shape (row,)."""
         self.rows: int = ends[-1]
         self.features = self.groups[0].env.layout.size
         self.size = self.features + PRIVILEGED_SIZE * (training.critic == "state")
@@ -166,13 +173,11 @@ class Rows:
 
     def step(self, action: Float32) -> Transition:
         """Step all worlds with actions (row, 2)."""
-        reward, ended = np.empty(self.rows, np.float32), np.empty((2, self.rows), np.bool_)
-        finals = [np.empty((0, self.size), np.float32)]
+        transitions: list[Transition] = []
         for group, rows in zip(self.groups, self._rows, strict=True):
-            reward[rows], ended[0, rows], ended[1, rows], seen, final = group.step(action[rows], self._seeds)
-            self.observation[rows] = seen
-            finals += [final] if len(final) else []
-        return Transition(reward, ended[0], ended[1], np.concatenate(finals))
+            transition, self.observation[rows] = group.step(action[rows], self._seeds)
+            transitions.append(transition)
+        return Transition(*map(np.concatenate, zip(*transitions, strict=True)))
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """The state for ``restore``, without the random generator."""

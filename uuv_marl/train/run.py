@@ -130,7 +130,7 @@ class Trainer:
         self.training, self._rng = training, np.random.default_rng(training.seed)
         self.rows = Rows(training, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
         self.learner = Learner(
-            training.network, training.card.sizes, self.rows.size, self.rows.rows, training.ppo, self._rng
+            training.network, training.card.sizes, self.rows.size, self.rows.part, training.ppo, self._rng
         )  # fmt: skip
         if checkpoint is not None:
             self.restore(checkpoint)
@@ -155,7 +155,7 @@ class Trainer:
         update = self.learner.update(batch, noise, rate)
         return Record(
             iteration=before.iteration + 1,
-            agent_steps=before.agent_steps + config.horizon * self.rows.rows,
+            agent_steps=before.agent_steps + int(batch.acted.sum()),
             seconds=before.seconds + time.process_time() - started,
             reward=reward,
             kl=update.kl,

@@ -13,7 +13,6 @@ from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.baselines.making import check_base_controller
 from uuv_marl.baselines.requirements import FULL_TORQUE_NM, inner_loop_nms
 from uuv_marl.envs.changes import Reward
-from uuv_marl.envs.core import refuse_losses
 from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
@@ -176,7 +175,6 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
                 f"got {self.reward!r}"
             )
         for name, scenario in self._scenarios.items():
-            refuse_losses(scenario, "training")
             card = self._card(scenario)
             if differs := next((f for f in Card.model_fields if getattr(card, f) != getattr(self.card, f)), None):
                 raise TrainingError(
