@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 
 from research.episodes import read_rows
 from tests.golden import STARTER
-from tests.nets import ANYWHERE, saved
+from tests.nets import ANYWHERE
 from uuv_marl import load_scenario, parallel_env, scenario_names
 from uuv_marl.baselines import POLICIES, Policy, PolicyError, make_policy, with_policy_requirements
-from uuv_marl.baselines.making import policy_requirements
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
 from uuv_marl.benchmark.tuning import SPACES, TRIALS
@@ -273,7 +272,7 @@ class Nothing(Policy):
     ("name", "message"),
     [
         ("sff", "link .sonar.channels.*use an environment's for_policy, with_policy_requirements"),
-        ("sdc", "compass and link .sonar.channels.*use an environment's for_policy, with_policy_requirements"),
+        ("sdc", "compass and link and identity .sonar.channels.*use an environment's for_policy, with_policy_requirements"),
         ("bio_inspired_plus", "yaw damping of 600 .*actuators.yaw_damping_nms.*with_policy_requirements"),
         ("tests.test_baselines:Nothing", r"policy '.*Nothing' must define decide\(percept\)"),
         ("bio_inspired,zeta_m=1", "has no parameter 'zeta_m'; did you mean 'zeta_"),
@@ -319,8 +318,8 @@ def test_the_inner_loop_is_scaled_with_the_vehicle_s_torque(name, change, dampin
 
 
 @pytest.mark.parametrize("name", [*POLICIES, "nearest_target,lanes=true", "sdc,safety_filter=true"])
-def test_a_policy_that_acts_by_a_vehicles_index_declares_it(name):
-    """Of any other policy all vehicles act alike that perceive the same; ``random`` draws for each."""
+def test_vehicles_that_perceive_the_same_act_alike(name):
+    """No policy but ``random`` uses a vehicle's row; ``identity`` is a channel."""
     plain = name.partition(",")[0].removeprefix("mappo_").removesuffix("_2")
     homes = {"nearest_target": "silent_targets", "oracle": "hard_water", "carrot_informed": "hard_water"}
     home = homes.get(plain, plain if plain in scenario_names() else "starter")
@@ -330,12 +329,7 @@ def test_a_policy_that_acts_by_a_vehicles_index_declares_it(name):
     for _ in range(12):
         action = policy.act(percept).copy()
         copies = dataclasses.replace(percept, flat=np.repeat(percept.flat[:, 2:3], 4, axis=1))
-        acted_alike &= np.allclose(alike.act(copies), action[:, 2:3], atol=1e-3)
+        acted = alike.act(copies)
+        acted_alike &= np.allclose(acted, acted[:, :1], atol=1e-3)
         percept = swarm.step(action)
-    assert policy_requirements(name).identity == (not acted_alike and name != "random")
-
-
-def test_a_network_around_a_law_that_acts_by_the_index_does_so_too(tmp_path):
-    for law, told in {"nearest_target,lanes=true": True, "nearest_target,lanes=false": False}.items():
-        checkpoint = saved(tmp_path, load_scenario("silent_targets"), base_controller=law)
-        assert policy_requirements(checkpoint).identity is told
+    assert acted_alike == (name != "random")

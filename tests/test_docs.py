@@ -187,9 +187,8 @@ def test_the_table_of_policies_is_right():
     assert set(needs) == set(POLICIES)
     for name, policy in POLICIES.items():
         required = policy.requirements
-        index = required.identity
-        identity = [f"with `{index}=true` identity"] if isinstance(index, str) else ["identity"] * index
-        parts = [*required.channels, *identity, *(["yaw damping"] if required.yaw_damping_nms else [])]
+        further = [f"with `{name}=true` {', '.join(own)}" for name, own in required.channels_if.items()]
+        parts = [*required.channels, *further, *(["yaw damping"] if required.yaw_damping_nms else [])]
         assert needs[name] == (", ".join(parts) or "nothing"), name
 
 

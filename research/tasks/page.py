@@ -122,9 +122,8 @@ def _final(groups: Groups, study: Study) -> str:
 
 def named(policy: str) -> str:
     """A policy with its extra observations."""
-    required = policy_requirements(runnable(policy))
-    beyond = [*required.channels, *(["identity"] if required.identity else [])]
-    return f"{policy} with {', '.join(beyond)}" if beyond else policy
+    channels = policy_requirements(runnable(policy)).channels
+    return f"{policy} with {', '.join(channels)}" if channels else policy
 
 
 def _policies(groups: Groups) -> list[str]:

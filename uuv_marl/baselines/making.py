@@ -12,7 +12,7 @@ from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.names import parse_name
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.registry import POLICIES, PolicyType, is_trained, policy_class
-from uuv_marl.baselines.requirements import PolicyRequirements, inner_loop_nms, resolved_channels
+from uuv_marl.baselines.requirements import PolicyRequirements, inner_loop_nms, resolved_channels, with_parameters
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
 from uuv_marl.errors import ScenarioError, hint
@@ -21,15 +21,9 @@ from uuv_marl.scenario.overrides import plain
 
 
 def policy_requirements(name: str) -> PolicyRequirements:
-    """Requirements of a policy by name; ``identity`` is resolved to whether it uses a vehicle's index."""
-    policy_type = policy_class(name)
-    required, identity = policy_type.requirements, policy_type.requirements.identity
-    if isinstance(policy_type, Trained):
-        base = policy_type.checkpoint.card.base_controller
-        identity = bool(base) and policy_requirements(base).identity
-    elif isinstance(identity, str):
-        identity = bool(_value(parse_name(name).parameters.get(identity, "false")))
-    return required._replace(identity=identity)
+    """Requirements of a policy by name and parameters."""
+    given = parse_name(name).parameters
+    return with_parameters(policy_class(name).requirements, [key for key in given if _value(given[key]) is True])
 
 
 def with_policy_requirements(name: str, scenario: Scenario) -> Scenario:
@@ -39,7 +33,7 @@ def with_policy_requirements(name: str, scenario: Scenario) -> Scenario:
     scenario has ``modem``, it replaces the channel ``link``, except for policies that require both and for trained
     policies, which use the channels of their training.
     """
-    return with_requirements(name, policy_class(name).requirements, scenario)
+    return with_requirements(name, policy_requirements(name), scenario)
 
 
 def with_requirements(name: str, required: PolicyRequirements, scenario: Scenario) -> Scenario:

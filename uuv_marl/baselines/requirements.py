@@ -1,7 +1,8 @@
 """What a policy requires of a scenario: extra observations, yaw damping and decision period; and the check."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 from uuv_marl.errors import PolicyError
@@ -23,8 +24,8 @@ class PolicyRequirements(NamedTuple):
     """Full torque of the vehicle for which the policy states ``yaw_damping_nms`` [N m]."""
     decision_period_s: float | None = None
     """Decision period [s]; None if the policy works with any."""
-    identity: bool | str = False
-    """Whether it uses a vehicle's index, which no percept holds; or the name of the parameter that makes it do so."""
+    channels_if: Mapping[str, Sequence[str]] = MappingProxyType({})
+    """Further channels by the name of a parameter that requires them where it is true."""
     outputs_force: bool = False
     """Whether ``decide`` returns desired forces. For a vehicle with a rudder they are then turned into thrust and
     rudder (``baselines.rudder``); for other vehicles they are actions already."""
@@ -41,6 +42,12 @@ def inner_loop_nms(required_nms: float, full_torque_nm: float, scenario: Scenari
         return 0.0
     scaled = required_nms * (actuators.max_torque_nm / full_torque_nm)
     return min(scaled, scenario.vehicle.inertia[3] / scenario.timing.control_step_s)
+
+
+def with_parameters(required: PolicyRequirements, true: Sequence[str]) -> PolicyRequirements:
+    """The requirements of a policy some of whose parameters are true, given by name."""
+    further = (channel for name, own in required.channels_if.items() if name in true for channel in own)
+    return required._replace(channels=(*required.channels, *further), channels_if={})
 
 
 def resolved_channels(scenario: Scenario, required: Sequence[str]) -> list[str]:

@@ -61,8 +61,6 @@ class PolicyInfo(TypedDict):
     channels: list[str]
     yaw_damping_nms: float
     """The policy's inner loop on a vehicle of ``FULL_TORQUE_NM``; ``inner_loop_nms`` gives that on another."""
-    identity: NotRequired[Literal[True]]
-    """Present where the policy uses a vehicle's index."""
     decision_period_s: NotRequired[float]
     """Required period between decisions [s], if any."""
     source: str | None
@@ -270,8 +268,6 @@ def policy_info(policy: str) -> PolicyInfo:
     required = policy_requirements(policy)
     damping = required.yaw_damping_nms * (FULL_TORQUE_NM / required.full_torque_nm)
     known = PolicyInfo(channels=list(required.channels), yaw_damping_nms=damping, source=source)
-    if required.identity:
-        known["identity"] = True
     if required.decision_period_s:
         known["decision_period_s"] = required.decision_period_s
     if isinstance(policy_type, Trained):

@@ -151,7 +151,7 @@ def _requirements_text(scenario: Scenario, policy: str, info: PolicyInfo) -> str
     """Class of a policy, and what it requires on a scenario beyond what the scenario gives to all."""
     texts = [info["policy_class"]] if "policy_class" in info else []
     required = with_requirements(policy, requirements_of(info), scenario)
-    texts += [*required.sonar.channels, *(["identity"] if "identity" in info else [])]
+    texts += required.sonar.channels
     if required.timing.decision_period_s != scenario.timing.decision_period_s:
         texts.append(f"a decision every {required.timing.decision_period_s:g} s")
     damping = required.actuators.yaw_damping_nms

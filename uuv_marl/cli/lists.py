@@ -88,8 +88,7 @@ def _policies() -> Table:
         required = policy_requirements(name)
         every = f"{required.decision_period_s:g}" if required.decision_period_s else "-"
         what = (policy_type.__doc__ or "").strip().partition("\n")[0]  # nothing under python -OO
-        beyond = [*required.channels, *(["identity"] if required.identity else [])]
-        table.add_row(name, ", ".join(beyond) or "-", f"{required.yaw_damping_nms:g}", every, what)
+        table.add_row(name, ", ".join(required.channels) or "-", f"{required.yaw_damping_nms:g}", every, what)
     return table
 
 

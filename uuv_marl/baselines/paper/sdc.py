@@ -65,7 +65,7 @@ class Sdc(Policy):
     """
 
     # Without yaw damping, in the settings tried by hand, the informed vehicle left the others behind: none arrived.
-    requirements = PolicyRequirements(("compass", "link"), yaw_damping_nms=600.0, identity=True, outputs_force=True)
+    requirements = PolicyRequirements(("compass", "link", "identity"), yaw_damping_nms=600.0, outputs_force=True)
     Memory: ClassVar[type[Any] | None] = SdcMemory
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SdcGains | None = None) -> None:
@@ -156,14 +156,15 @@ def _force(
     ``slots`` (vehicle, 2) and ``depth`` (vehicle,) are those of the world, ``rho`` the half width of the funnel [m].
     The vehicle at depth 0 is informed and uses the reference.
     """
-    informed = depth[i] == 0.0
+    own = max(_index(float(see.identity[w, i, 0]) * depth.shape[0] + 1.0, depth.shape[0]), 0)
+    informed = depth[own] == 0.0
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     c, s = float(see.compass[w, i, 0]), float(see.compass[w, i, 1])
     # A vehicle without detected predecessors, such as the informed one, coordinates with all its neighbours.
     follows = False
     for k in range(see.detected.shape[2]):
         j = _index(see.link_identity[w, i, k], depth.shape[0])
-        follows = follows or (see.detected[w, i, k] > 0.0 and j >= 0 and depth[j] < depth[i])
+        follows = follows or (see.detected[w, i, k] > 0.0 and j >= 0 and depth[j] < depth[own])
     z_x, z_y, w_x, w_y, near_x, near_y, num = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
     for k in range(see.detected.shape[2]):
         if see.detected[w, i, k] == 0.0:
@@ -173,8 +174,8 @@ def _force(
         away = g.short * bump(distance / g.short_range) / distance
         near_x, near_y = near_x - away * p_x, near_y - away * p_y
         j = _index(see.link_identity[w, i, k], depth.shape[0])
-        if j >= 0 and (depth[j] < depth[i] or not follows):
-            d_x, d_y = slots[j, 0] - slots[i, 0], slots[j, 1] - slots[i, 1]
+        if j >= 0 and (depth[j] < depth[own] or not follows):
+            d_x, d_y = slots[j, 0] - slots[own, 0], slots[j, 1] - slots[own, 1]
             z_x, z_y = z_x + c * d_x + s * d_y - p_x, z_y + c * d_y - s * d_x - p_y
             w_x, w_y = w_x + see.link_velocity[w, i, k, 0] - u, w_y + see.link_velocity[w, i, k, 1] - v
             num += 1
@@ -182,8 +183,8 @@ def _force(
     if num > 0:
         z_x, z_y, w_x, w_y, weight = z_x / num, z_y / num, w_x / num, w_y / num, 1.0
     if informed:
-        e_x = -c * slots[i, 0] - s * slots[i, 1] - see.reference[w, i, 0]
-        e_y = -c * slots[i, 1] + s * slots[i, 0] - see.reference[w, i, 1]
+        e_x = -c * slots[own, 0] - s * slots[own, 1] - see.reference[w, i, 0]
+        e_y = -c * slots[own, 1] + s * slots[own, 0] - see.reference[w, i, 1]
         z_x, z_y, weight = z_x + g.reference * e_x, z_y + g.reference * e_y, weight + g.reference
     f_x, f_y, clamped = g.drag * own_drag(u, limits), 0.0, 0
     if weight > 0.0:

@@ -15,6 +15,7 @@ from uuv_marl.baselines.memory import Surroundings, update_memory
 from uuv_marl.baselines.memory.pose import to_map, to_map_axes
 from uuv_marl.baselines.memory.table import with_surroundings
 from uuv_marl.baselines.policy import Limits, PolicyError, tuned
+from uuv_marl.baselines.requirements import with_parameters
 from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
 from uuv_marl.baselines.safety.filtered import Filtered
 from uuv_marl.baselines.scout.controller import pushed
@@ -65,13 +66,14 @@ class NearestTarget(Filtered):
     """
 
     Memory: ClassVar[type[Any] | None] = SeekerMemory
-    requirements = Filtered.requirements._replace(identity="lanes")
+    requirements = Filtered.requirements._replace(channels_if={"lanes": ["identity"]})
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, gains: SeekerGains | None = None,
         barrier: Barrier | None = None,
     ) -> None:  # fmt: skip
         tuned_gains, safe = with_numbers(tuned("nearest_target", "lanes" if lanes else ""), SeekerGains(), Barrier())
+        self.requirements = with_parameters(self.requirements, ["lanes"] * lanes)
         super().__init__(scenario, num_worlds, barrier or safe)
         self.gains = gains or tuned_gains
         if "box" not in self.layout.starts:
@@ -183,7 +185,8 @@ def _turn_back(w: int, i: int, most: float, lanes: int, see: Fields, box: Float3
     if search[0] == 0.0 and search[1] == 0.0:
         search[0], search[1] = float(box[w, i, 0]), float(box[w, i, 1])
         if lanes:
-            search[0], search[1] = (1.0 if i % 2 == 0 else -1.0), i + 0.5
+            lane = round(float(see.identity[w, i, 0]) * lanes - 0.5)
+            search[0], search[1] = (1.0 if lane % 2 == 0 else -1.0), lane + 0.5
     place = place_in_box(w, i, see, box)
     for k in range(1 if lanes else 2):
         if abs(place[k]) > most and place[k] * search[k] > 0.0:
