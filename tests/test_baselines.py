@@ -272,7 +272,7 @@ class Nothing(Policy):
     ("name", "message"),
     [
         ("sff", "link .sonar.channels.*use an environment's for_policy, with_policy_requirements"),
-        ("sdc", "compass and link and identity .sonar.channels.*use an environment's for_policy, with_policy_requirements"),
+        ("sdc", "compass and link and identity .sonar.channels.*use an environment.s for_policy, with_policy"),
         ("bio_inspired_plus", "yaw damping of 600 .*actuators.yaw_damping_nms.*with_policy_requirements"),
         ("tests.test_baselines:Nothing", r"policy '.*Nothing' must define decide\(percept\)"),
         ("bio_inspired,zeta_m=1", "has no parameter 'zeta_m'; did you mean 'zeta_"),

@@ -26,7 +26,9 @@ def test_so_many_are_informed_and_each_episode_draws_who(k):
     informed = swarm.world_map.informed.copy()
     assert (informed.sum(axis=1) == min(k, N)).all()
     np.testing.assert_array_equal(swarm.percept["informed"][..., 0], informed)
-    np.testing.assert_array_equal(global_state(swarm, state_layout(swarm.scenario))[:, -N:], informed)
+    layout = state_layout(swarm.scenario)
+    start = layout.starts["informed"]
+    np.testing.assert_array_equal(global_state(swarm, layout)[:, start : start + N], informed)
     assert k > N or len({row.tobytes() for row in informed}) == 6
     swarm.reset(0)
     np.testing.assert_array_equal(swarm.world_map.informed, informed)
@@ -125,7 +127,7 @@ def test_there_is_at_the_end_once_the_reference_rests_and_who_touched_something_
     swarm.state.collided[0, [informed[0], uninformed[0], uninformed[1]]] = True
     swarm.state.eta[0, uninformed[2], :2] += 200.0
     result = batch.step(np.zeros((1, N, 2)))
-    assert result.terms["arrival"][0].tolist() == [20.0 * (k != uninformed[2]) for k in range(N)]
+    assert (result.terms["stay"][0] > 0.0).tolist() == [k != uninformed[2] for k in range(N)]
     assert not result.over.any()
     expected = {"success_share": 1 - 4 / N, "swarm_success": 0.0, "uninformed_share": 1 - 3 / (N - K)}
     assert batch.task.metrics(0) == pytest.approx(expected)

@@ -188,7 +188,7 @@ def test_at_a_goal_at_rest_who_touched_something_has_failed():
     swarm.state.collided[0, 2] = True
     result = batch.step(np.zeros((1, 5, 2)))
     assert result.world_terminated[0]
-    assert result.terms["arrival"][0].tolist() == 5 * [20.0]
+    assert result.terms["stay"][0] == pytest.approx(5 * [20.0])  # all of the time limit
     assert batch.task.metrics(0) == {"success_share": 0.8, "swarm_success": 0.0}
 
 
@@ -248,7 +248,9 @@ def test_numbers_that_a_task_needs_are_missed_when_a_swarm_is_made():
 
 
 def test_a_reward_that_a_task_does_not_know_or_does_not_give_is_refused():
-    with pytest.raises(ValueError, match="reward must be 'dense', 'team' or a function of the swarm, got 'sparse'"):
+    with pytest.raises(
+        ValueError, match="reward must be 'dense', 'first_arrival', 'team' or a function of the swarm, got 'sparse'"
+    ):
         uuv_marl.parallel_env("starter", task="reach", reward="sparse")
     env = uuv_marl.parallel_env("starter", task=f"{__name__}:Broken")
     env.reset(seed=0)
