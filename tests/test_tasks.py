@@ -222,6 +222,7 @@ NEAR = PerceptField("near", (1,), FLAG, "1 within 10 m")
     (Survive, {"observed": (NEAR,), "channels": {"sight": (NEAR,)}}, "can't have near in observed or channels"),
     (Survive, {"channels": {"compass": (NEAR,)}}, "can't have compass in channels"),
     (Survive, {"rewards": {"dense": {}, "team": {}}}, "can't have team in rewards"),
+    (Follow, {"rewards": {"dense": {"mine": ""}}}, "has rewards of its own; define reward(running)"),
 ])  # fmt: skip
 def test_a_task_that_lacks_a_method_or_takes_a_name_twice_is_refused_by_it(monkeypatch, base, own, message):
     monkeypatch.setattr(sys.modules[__name__], "Unfit", type("Unfit", (base,), own), raising=False)

@@ -13,6 +13,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from uuv_marl.errors import ScenarioError
 from uuv_marl.percept import AGE, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Facts, State
@@ -52,6 +53,13 @@ class Follow(Task):
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
         self._weights = reward_weights(swarm.scenario)
+
+    @classmethod
+    def check(cls) -> None:
+        """Also raise ScenarioError for a subclass with other ``rewards`` and the reward of this class."""
+        super().check()
+        if cls.reward is Follow.reward and cls.rewards != Follow.rewards:
+            raise ScenarioError(f"task {cls.__name__} has rewards of its own; define reward(running), which gives them")
 
     def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
         """The scenario's own start, trajectory and obstacles."""

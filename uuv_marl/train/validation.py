@@ -74,7 +74,8 @@ def _runs(policy: str, part: Part, seeds: Sequence[int]) -> Iterator[Run]:
 def _end_s(run: Run) -> float:
     """Time at which a successful episode completed its task [s]."""
     arrived = run.metrics["task_time_s"]
-    return float(run.routes.time_s[-1]) if arrived is None else arrived
+    followed = "swarm_success" not in run.metrics.get("task", {})
+    return arrived if followed and arrived is not None else float(run.routes.time_s[-1])
 
 
 def shares_of(metrics: Metrics, headline: str) -> tuple[float, bool]:
