@@ -37,6 +37,7 @@ ANGLE = Quantity("rad", 1.0, -math.pi, math.pi)
 FLAG = Quantity("1", 1.0, 0.0, 1.0)
 DIRECTION = Quantity("1", 1.0, -1.0, 1.0)
 AGE = Quantity("s", 1.0, 0.0, 4096.0)
+DURATION = Quantity("s", 64.0, 0.0, 4096.0)
 IDENTITY = Quantity("1", _MAX_VEHICLES, 0.0, _MAX_VEHICLES)
 
 

@@ -14,7 +14,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.percept import AGE, FieldTable, PerceptField
+from uuv_marl.percept import DURATION, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import Facts, State
 from uuv_marl.sim.compiled import compiled
@@ -102,7 +102,7 @@ class Follow(Task):
     @classmethod
     def state_fields(cls, scenario: Scenario) -> FieldTable:
         """Also for how long the swarm has been together at the end."""
-        return *super().state_fields(scenario), PerceptField("dwell", (1,), AGE, "time in arrival.spread_m")
+        return *super().state_fields(scenario), PerceptField("dwell", (1,), DURATION, "time in arrival.spread_m")
 
     def state(self) -> Terms:
         """The values of ``state_fields``."""
