@@ -68,7 +68,7 @@ def test_the_gallery_shows_every_task_and_is_as_its_tool_makes_it():
     assert (ROOT / "docs" / "gallery.md").read_text() == gallery.page()
     films = list(gallery.FOLDER.iterdir())
     assert {path.stem for path in films} == {film.name for film in gallery.FILMS}
-    assert sum(path.stat().st_size for path in films) < 5_000_000
+    assert sum(path.stat().st_size for path in films) < 3_000_000
     shown = {load_scenario(film.scenario).task.name for film in gallery.FILMS}
     assert shown == set(TASKS) - {"reach"}
     assert {film.kind for film in gallery.FILMS} - {""} == set(KINDS)
