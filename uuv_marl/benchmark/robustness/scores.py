@@ -34,12 +34,13 @@ def axis_score(table: Any, axis: str) -> Estimate | None:
 
 
 def group_score(table: Any, group: str) -> Estimate | None:
-    """A policy's mean over the axes of a group that were run; None for none.
+    """A policy's mean over the axes of a group that were run; None where no seed has all of them.
 
     ``EVERY``: over the groups, but X and those that concern only policies with some channel.
     """
     seeds = _group(table, group)
-    return None if seeds is None else scored(seeds[~np.isnan(seeds)])
+    whole = [] if seeds is None else seeds[~np.isnan(seeds)]
+    return scored(whole) if len(whole) else None
 
 
 def _group(table: Any, group: str) -> Float64 | None:
