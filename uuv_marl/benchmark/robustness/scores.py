@@ -39,8 +39,7 @@ def group_score(table: Any, group: str) -> Estimate | None:
     ``EVERY``: over the groups, but X and those that concern only policies with some channel.
     """
     seeds = _group(table, group)
-    whole = [] if seeds is None else seeds[~np.isnan(seeds)]
-    return scored(whole) if len(whole) else None
+    return None if seeds is None or np.isnan(seeds).all() else scored(seeds[~np.isnan(seeds)])
 
 
 def _group(table: Any, group: str) -> Float64 | None:
