@@ -45,11 +45,11 @@ def main(
 ) -> None:
     """Run shipped episodes again and compare every number with its file, digit by digit.
 
-    Rows of each file are drawn at random until ``--sample`` could be run. The simulation gives the same bits on any x86-64
-    processor, so every digit of the file must come out again. A row agrees, differs (the field, its value in the file,
-    its value now), or is not reproducible here, with the reason: such a row never counts as agreeing. 24 rows of each
-    file of docs take two minutes on one core. Ctrl-C shows what was compared until then. The exit status is 0 where all
-    rows that could be run agree, and 1 where one differs or none of a file could be run.
+    Rows of each file are drawn at random until ``--sample`` could be run. The simulation gives the same bits on any
+    x86-64 processor, so every digit of the file must come out again. A row agrees, differs (the field, its value in the
+    file, its value now), or is not reproducible here, with the reason: such a row never counts as agreeing. 24 rows of
+    each file of docs take two minutes on one core. Ctrl-C shows what was compared until then. The exit status is 0
+    where all rows that could be run agree, and 1 where one differs or none of a file could be run.
 
     Example: python -m research.verify --sample 100 --only random_field_n10
     """
