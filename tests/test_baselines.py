@@ -19,7 +19,7 @@ from uuv_marl import load_scenario, parallel_env, scenario_names
 from uuv_marl.baselines import POLICIES, Policy, PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
-from uuv_marl.benchmark.tuning import SPACES, TRIALS
+from uuv_marl.benchmark.tuning import OBJECTIVES, SPACES, TRIALS
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 
@@ -170,6 +170,7 @@ def test_tuned_gains_come_from_shipped_trials(file):
     trials = read_rows(TRIED / f"{file}.csv.gz")
     name, _, what = file.partition(".")
     assert len(trials) == TRIALS
+    assert data["objective"] in OBJECTIVES
     assert all(10_000 <= seed < 100_000 for seed in data["seeds"])
     best = {key: float(value) for key, value in min(trials, key=lambda trial: float(trial["cost_s"])).items()}
     assert best == {"cost_s": data["best_cost_s"], **data["best"]}

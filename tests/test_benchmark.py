@@ -9,7 +9,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements
+from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.estimates import estimate
@@ -17,6 +17,7 @@ from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.results import Results, ResultsError
 from uuv_marl.benchmark.tables import Table, terminal_table
 from uuv_marl.cli import app
+from uuv_marl.errors import PolicyError
 
 QUICK = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0, "swarm.num_vehicles": 8}
 SETS = [f"--set={field}={value}" for field, value in QUICK.items()]
@@ -166,13 +167,23 @@ def test_the_command_line_from_end_to_end(tmp_path):
     assert (tmp_path / "results.json").read_bytes() == before
 
 
+@pytest.mark.parametrize("name", ["bio_inspired", "scout", "mappo", "idle"])
+def test_the_parameters_listed_are_those_that_a_policy_s_name_takes(name):
+    shown = CliRunner().invoke(app, ["list", "policies", f"--show={name}"]).output
+    listed = set(shown.partition("Parameters: ")[2].strip().split(", ")) - {"safety_filter", "own_clock"}
+    scenario = with_policy_requirements(name, load_scenario("tracking"))
+    with pytest.raises(PolicyError, match="has no parameter") as error:
+        make_policy(f"{name},nothing=1", scenario)
+    assert listed == set(str(error.value).partition("it has ")[2].split(", ")) - {"gains", "barrier", "none"}
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["benchmark", "--scenario=singel_obstacle"], "did you mean"),
         (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must lie within 0.001 to 1,000,000"),
         (["list", "--show=trackin"], "did you mean"),
-        (["list", "policies", "--show=sff"], "a policy has no file"),
+        (["list", "policies", "--show=sf"], "did you mean 'sff'"),
         (["benchmark", "--set=actuators.yaw_damping_nms=600"], "every policy has its own"),
         (["benchmark", "--scenario=tracking", "--scenario=tracking"], "different names"),
         (["benchmark", "--policy=:"], "policy ':' can't be imported"),

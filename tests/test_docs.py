@@ -3,9 +3,11 @@
 import importlib.util
 import json
 import re
+import sys
 import warnings
 from fnmatch import fnmatch
 from pathlib import Path
+from types import ModuleType
 from typing import Literal, get_args, get_origin
 
 import pytest
@@ -55,9 +57,11 @@ def is_run_here(block):
 @pytest.mark.parametrize("block", [param for param in blocks("python") if is_run_here(param.values[0])])
 def test_python_blocks_run_and_show_something(block, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    example = ModuleType("example")
+    monkeypatch.setitem(sys.modules, "example", example)  # its classes have names module:Class
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module="torchrl|tensordict")
-        exec(compile(begun(block), "README.md", "exec"), {"__name__": "example"})
+        exec(compile(begun(block), "README.md", "exec"), vars(example))
     assert capsys.readouterr().out or block.startswith("# mine.py")
 
 
@@ -68,7 +72,7 @@ def test_the_gallery_shows_every_task_and_is_as_its_tool_makes_it():
     assert (ROOT / "docs" / "gallery.md").read_text() == gallery.page()
     films = list(gallery.FOLDER.iterdir())
     assert {path.stem for path in films} == {film.name for film in gallery.FILMS}
-    assert sum(path.stat().st_size for path in films) < 5_000_000
+    assert sum(path.stat().st_size for path in films) < 3_000_000
     shown = {load_scenario(film.scenario).task.name for film in gallery.FILMS}
     assert shown == set(TASKS) - {"reach"}
     assert {film.kind for film in gallery.FILMS} - {""} == set(KINDS)

@@ -63,7 +63,7 @@ def test_groups_that_swap_sides_have_colours_of_their_own_and_so_have_their_goal
         goals = camera.pixels(np.array([way[-1] for number, way in swap.groups.paths.values() if number == own]))
         assert len(goals) == 20
         assert np.mean([near(picture, place, ink.TEAMS[own], 1) for place in goals]) > 0.9
-    assert words(swap)[:3] == ["group 1", "group 2", "goal of a vehicle"]
+    assert words(swap)[:3] == ["group 1", "group 2", "goal"]
 
 
 def test_a_goal_at_rest_is_a_goal_in_the_legend_and_nothing_to_follow():

@@ -82,6 +82,12 @@ def test_the_whole_counts_no_group_that_some_policies_lack():
     assert scores.group_score(table(**cells, C1_1=[0.0] * 6, X_1=[0.0] * 6), scores.EVERY) == without
 
 
+def test_a_group_of_which_every_seed_misses_a_cell_has_no_score():
+    half = table(calm=[1.0] * 6, W1_1=[1.0, np.nan] * 3, W1_3=[np.nan, 1.0] * 3)
+    assert scores.group_score(half, AXES["W1"].group) is None
+    assert scores.group_score(half, scores.EVERY) is None
+
+
 # Job, page, command
 
 

@@ -132,7 +132,7 @@ def test_every_kind_of_shipped_row_knows_what_it_is_made_of():
         ({"learner": "evil:Law"}, "policy 'evil:Law' is not part of the package"),
         ({"learner": "research.blind:Blind,inner=evil:Law"}, "is not part of the package"),
         ({"learner": "other", "training": "0"}, "there is no training '0' of a learner 'other' in this version"),
-        ({"learner": "IPPO", "training": "7"}, "of hard_water-IPPO-7 no policy is kept"),
+        ({"learner": "IPPO", "training": "7"}, "no policy of this training is kept"),
         ({"set": "nowhere"}, "there is no set 'nowhere' of task 'hard_water' in this version"),
     ],
 )
@@ -143,3 +143,13 @@ def test_rows_of_learners_come_out_again_and_run_nothing_from_elsewhere(tmp_path
     code, output = verify("learners.csv")
     assert code == bool(reason), output
     assert reason in output
+
+
+def test_rows_are_drawn_from_each_file_until_so_many_could_be_run(tmp_path):
+    (row,) = select(read_rows(DOCS / "paper.csv.gz"), policy="sdc", seed="4")
+    write_rows(tmp_path / "one.csv", [row])
+    write_rows(tmp_path / "two.csv", [*[row | {"policy": "nobody"}] * 9, row])
+    code, output = verify(tmp_path, "--sample", "1", "--seed", "0")
+    assert code == 0, output
+    assert output.count("1 of 1 rows that were run agree in every digit") == 2
+    assert "no number of the paper is of 'nobody' in " in output

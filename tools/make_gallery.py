@@ -14,7 +14,7 @@ from uuv_marl.scenario import load_scenario
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "gallery"
-SIZE, LASTS_S, COLUMNS = (440, 520), 5.0, 3
+SIZE, LASTS_S, COLUMNS = (400, 480), 4.0, 3
 """Size of a film [px], its duration [s], and the number of films side by side."""
 _DATA = tomllib.loads(Path(__file__).with_name("gallery.toml").read_text(encoding="utf-8"))
 

@@ -12,6 +12,7 @@ from research.paper.ledger import NUMBERS, Entry, number_entry
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.suite import Case, Suite
 from uuv_marl.benchmark.tables import markdown_table
+from uuv_marl.errors import ResultsError
 
 METRICS = tuple(dict.fromkeys(number.metric for number in NUMBERS))
 """Metrics of an episode that are kept."""
@@ -20,7 +21,9 @@ _CASES = {(number.case.scenario, number.case.policy): number.case for number in 
 
 
 def case_of(scenario: str, policy: str) -> Case:
-    """A case of the paper's numbers. Raises KeyError where there is none."""
+    """A case of the paper's numbers. Raises ResultsError where there is none."""
+    if (scenario, policy) not in _CASES:
+        raise ResultsError(f"no number of the paper is of {policy!r} in {scenario!r} in this version")
     return _CASES[scenario, policy]
 
 

@@ -1,7 +1,8 @@
 """``python -m research.verify``: shipped episodes run again, and compared digit by digit."""
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections import Counter
+from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated
 
@@ -27,7 +28,7 @@ def main(
             metavar="[FILE|FOLDER]...",
         ),
     ] = None,
-    sample: Annotated[int, typer.Option(min=1, help="How many rows; all, where there are not more.")] = 24,
+    sample: Annotated[int, typer.Option(min=1, help="How many rows of each file; all, where there are not more.")] = 24,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Draws the rows. Default: another one each time; it is printed.")
     ] = None,
@@ -44,11 +45,11 @@ def main(
 ) -> None:
     """Run shipped episodes again and compare every number with its file, digit by digit.
 
-    The rows are drawn at random. The simulation gives the same bits on any x86-64 processor, so every digit of the file
-    must come out again. A row agrees, differs (the field, its value in the file, its value now), or is not
-    reproducible here, with the reason: such a row never counts as agreeing. 24 rows take a few minutes. Ctrl-C shows
-    what was compared until then. The exit status is 0 where all rows that could be run agree, and 1 where one differs
-    or none could be run.
+    Rows of each file are drawn at random until ``--sample`` could be run. The simulation gives the same bits on any
+    x86-64 processor, so every digit of the file must come out again. A row agrees, differs (the field, its value in the
+    file, its value now), or is not reproducible here, with the reason: such a row never counts as agreeing. 24 rows of
+    each file of docs take two minutes on one core. Ctrl-C shows what was compared until then. The exit status is 0
+    where all rows that could be run agree, and 1 where one differs or none of a file could be run.
 
     Example: python -m research.verify --sample 100 --only random_field_n10
     """
@@ -57,44 +58,46 @@ def main(
         if others:
             names = ", ".join(sorted({path.name for path in others}))
             console.print(f"Left out, because they hold no episodes: {names}.", highlight=False)
-        selected = check.only(rows, only or [], policy or [])
+        selected = groupby(check.only(rows, only or [], policy or []), lambda row: row.file)
         find_modules(policy or [])
         seed = check.fresh_seed() if seed is None else seed
-        drawn = check.draw(selected, sample, seed)
-        console.print(
-            f"{len(drawn):,} of {len(selected):,} rows, drawn with --seed {seed}; another seed draws others.",
-            highlight=False,
-        )
-        verdicts: list[Verdict] = []
-        stopped = False
-        try:
-            with progress_bar() as bar:
-                report = progress_line(bar, "verify", len(drawn))
-                for k, row in enumerate(drawn):
-                    note = partial(_note, report, k, row)
-                    note(0.0)
-                    verdicts.append(check.check(row, policy or [], note))
-                report(len(drawn), "verify")
-        except KeyboardInterrupt:
-            stopped = True
-        _show(verdicts)
-        console.print(check.summary(verdicts, len(selected)), highlight=False)
-        if stopped:
-            console.print(f"Stopped after {len(verdicts)} of {len(drawn)} rows.")
-            raise typer.Exit(130)
-        raise typer.Exit(int(check.failed(verdicts)))
+        console.print(f"Rows of each file, drawn with --seed {seed}; another seed draws others.", highlight=False)
+        failed = [_verify(file, [*own], sample, seed, policy or []) for file, own in selected]
+        raise typer.Exit(int(any(failed)))
 
 
-def _note(report: Callable[..., None], done: int, row: Row, share: float) -> None:
-    report(done + share, row.name[-60:])
+def _verify(file: Path, rows: Sequence[Row], sample: int, seed: int, allowed: Sequence[str]) -> bool:
+    """Compare a file, print its table, and return whether it failed."""
+    verdicts: list[Verdict] = []
+    stopped = False
+    try:
+        with progress_bar() as bar:
+            line = progress_line(bar, "verify", min(sample, len(rows)))
+
+            def report(done: int, row: Row, share: float) -> None:
+                line(done + share, row.name[-60:])
+
+            verdicts.extend(check.compare(rows, sample, seed, allowed, report))  # Ctrl-C leaves those before it
+    except KeyboardInterrupt:
+        stopped = True
+    _show(verdicts)
+    console.print(f"{file}: {check.summary(verdicts, len(rows))}", highlight=False)
+    if stopped:
+        console.print(f"Stopped after {len(verdicts)} rows of {file}.")
+        raise typer.Exit(130)
+    return check.failed(verdicts)
 
 
 def _show(verdicts: Sequence[Verdict]) -> None:
     table = Table("row", "episode", "result", show_lines=True)
+    reasons = Counter(verdict.reason for verdict in verdicts)
     for verdict in verdicts:
         row = verdict.row
         if verdict.reason:
-            result = f"[yellow]not reproducible here:[/] {escape(verdict.reason)}"
+            if not (count := reasons.pop(verdict.reason, 0)):
+                continue
+            others = f" ({count - 1} more likewise)" if count > 1 else ""
+            result = f"[yellow]not reproducible here:[/] {escape(verdict.reason)}{others}"
         elif verdict.differences:
             lines = (f"{d.field}: {d.shipped or 'nothing'} in the file, now {d.now or 'nothing'}"
                      for d in verdict.differences)  # fmt: skip

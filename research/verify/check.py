@@ -1,7 +1,8 @@
 """Rows drawn at random, run again and compared, digit by digit."""
 
 import secrets
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,7 +18,10 @@ from uuv_marl.benchmark.evaluate import Run, blaming, episodes
 from uuv_marl.benchmark.results import FILE
 from uuv_marl.errors import USER_ERRORS, DivergenceError, PolicyError, ResultsError
 
+Report = Callable[[int, Row, float], None]
+"""Called with the number of rows that were run, the row that runs now, and its finished share."""
 _HOME = "heldout.csv.gz"
+_DRAWS = 20
 
 
 class Difference(NamedTuple):
@@ -96,10 +100,18 @@ def fresh_seed() -> int:
     return secrets.randbelow(1_000_000)
 
 
-def draw(rows: Sequence[Row], sample: int, seed: int) -> list[Row]:
-    """At most ``sample`` rows in random order, so that the first of them are also a fair sample."""
-    picked = np.random.default_rng(seed).choice(len(rows), min(sample, len(rows)), replace=False)
-    return [rows[k] for k in picked.tolist()]
+def compare(rows: Sequence[Row], sample: int, seed: int, allowed: Collection[str], report: Report) -> Iterator[Verdict]:
+    """Draw rows at random until ``sample`` of them could be run; of each row, its verdict.
+
+    At most ``_DRAWS`` times as many are drawn.
+    """
+    compared, order = 0, list[int](np.random.default_rng(seed).permutation(len(rows)).tolist())
+    for k in order[: _DRAWS * sample]:
+        if compared == sample:
+            return
+        verdict = check(rows[k], allowed, partial(report, compared, rows[k]))
+        compared += not verdict.reason
+        yield verdict
 
 
 def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -> Verdict:
@@ -142,7 +154,7 @@ def _upper_bound(count: int, rows: int) -> float:
 
 
 def summary(verdicts: Sequence[Verdict], rows: int) -> str:
-    """The number of rows that agree, and a bound for all rows."""
+    """The number of a file's rows that agree, and a bound for all that can be run."""
     run = [verdict for verdict in verdicts if not verdict.reason]
     if not verdicts:
         return "No row was run."
@@ -151,5 +163,6 @@ def summary(verdicts: Sequence[Verdict], rows: int) -> str:
     if left:
         words.append(f"{left} more can't be reproduced here and count as neither.")
     if run and len(run) < rows:
-        words.append(f"Fewer than {_upper_bound(differ, len(run)):.1%} of the {rows:,} rows differ (95 % confidence).")
+        which = "rows that can be run" if left else f"{rows:,} rows"
+        words.append(f"Fewer than {_upper_bound(differ, len(run)):.1%} of the {which} differ (95 % confidence).")
     return " ".join(words)

@@ -144,9 +144,7 @@ def _learned(cells: Cells) -> Source:
             raise ResultsError(f"there is no training {cells['training']!r} of a learner {policy!r} in this version")
         cell = learners.Cell(task, LEARNERS[policy], int(cells["training"]))
         if not cell.shipped_weights.exists():
-            raise PolicyError(
-                f"of {cell.shipped_weights.stem} no policy is kept; python -m research.learners trains it again"
-            )
+            raise PolicyError("no policy of this training is kept; python -m research.learners trains it again")
         policy = cell.policy(cell.shipped_weights)
     return Source(load_scenario(each.scenario, overrides=each.overrides), policy)
 

@@ -139,7 +139,8 @@ def _with_parameters(
     policy: Any = constructor(scenario, num_worlds, **{key: values.pop(key) for key in known if key in values})
     if values:
         gains: Any = getattr(policy, "gains", None)
-        policy.gains = gains._replace(**{key: _gain(name, key, value, gains, known) for key, value in values.items()})
+        replaced = {key: _gain(name, key, value, gains, known) for key, value in values.items()}
+        policy.gains = gains._replace(**replaced)
     return policy
 
 

@@ -1,13 +1,14 @@
 """``uuv-marl list``: all scenarios, vehicles and policies."""
 
+import inspect
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any, get_args
 
 import typer
 from rich.syntax import Syntax
 from rich.table import Table
 
-from uuv_marl.cli.console import console, explained
+from uuv_marl.cli.console import console, explained, find_modules
 
 
 class ListKind(StrEnum):
@@ -24,11 +25,12 @@ def show_list(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Print the file of this scenario or vehicle, such as lauv or remus100+munk_on, with all sources.",
+            help="Print the file of this scenario or vehicle, such as lauv or remus100+munk_on, with all sources; "
+            "after policies, what this policy does and its parameters.",
         ),
     ] = None,
 ) -> None:
-    """List scenarios, vehicles and how they move, or policies; or show one scenario or vehicle.
+    """List scenarios, vehicles and how they move, or policies; or show one of them.
 
     Other commands take a vehicle by ``--set vehicle=NAME``.
 
@@ -36,7 +38,10 @@ def show_list(
     """
     with explained():
         if show is not None:
-            _print_toml(_file(what, show))
+            if what is ListKind.POLICIES:
+                console.print(_policy(show), markup=False, highlight=False, soft_wrap=True)
+            else:
+                _print_toml(_file(what, show))
             return
         tables = {ListKind.SCENARIOS: _scenarios, ListKind.VEHICLES: _vehicles, ListKind.POLICIES: _policies}
         for kind, table in tables.items():
@@ -48,10 +53,24 @@ def _file(what: ListKind | None, name: str) -> str:
     """The text of a scenario's or a vehicle's file."""
     from uuv_marl.scenario import show, show_vehicle, vehicle_names
 
-    if what is ListKind.POLICIES:
-        raise typer.BadParameter("a policy has no file to show; docs/policies.md describes each", param_hint="--show")
     known = name.partition("+")[0] in vehicle_names()
     return show_vehicle(name) if what is ListKind.VEHICLES or (what is None and known) else show(name)
+
+
+def _policy(name: str) -> str:
+    """A policy's docstring, and the parameters and gains that can follow its name."""
+    from uuv_marl.baselines.names import OWN_CLOCK, SAFETY_FILTER
+    from uuv_marl.baselines.registry import policy_class
+
+    find_modules([name])
+    policy_type: Any = policy_class(name)
+    names: list[str] = []
+    for key, parameter in inspect.signature(policy_type).parameters.items():
+        if key == "gains":
+            names += [gain for one in get_args(parameter.annotation) for gain in getattr(one, "_fields", ())]
+        elif key not in ("scenario", "num_worlds", "barrier"):
+            names.append(key)
+    return f"{inspect.getdoc(policy_type) or ''}\n\nParameters: {', '.join([*names, SAFETY_FILTER, OWN_CLOCK])}"
 
 
 def _scenarios() -> Table:

@@ -130,8 +130,8 @@ class SilentTargets(Reach):
     }}  # fmt: skip
     traffic: ClassVar[bool] = False
     has_goal: ClassVar[bool] = False
-    reference_label: ClassVar[str] = "middle of the box"
-    mark_label: ClassVar[str] = "target is held within"
+    reference_label: ClassVar[str] = "centre of the box"
+    mark_label: ClassVar[str] = "range in which a target is held"
     headline: ClassVar[str] = "held_share"
     columns: ClassVar[Mapping[str, str]] = {
         "held_share": "share of the last half of the episode in which targets are held, mean over targets [1]",

@@ -99,8 +99,7 @@ class TwoSwarms(Reach):
         "swarm_time_ratio": "the same of the last vehicle, if all reached their goals [1]",
     }
     traffic: ClassVar[bool] = False
-    reference_label: ClassVar[str] = "goal of a vehicle"
-    mark_label: ClassVar[str] = "a vehicle is at its goal"
+    mark_label: ClassVar[str] = "goal tolerance"
     reference_policy: ClassVar[str] = "tangent_bug"
 
     def __init__(self, swarm: Swarm) -> None:

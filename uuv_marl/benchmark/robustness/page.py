@@ -69,7 +69,8 @@ def _scores(table: Any) -> str:
     for policy, own in table.groupby(level="policy", sort=False):
         scores = {group: group_score(own, group) for group in _GROUPS}
         cells = [f"{s:.2f}" if s and g == EVERY else f"{s.value:.2f}" if s else NOTHING for g, s in scores.items()]
-        calm = f"{scored(own[CALM].dropna().to_numpy()).value:.2f}" if CALM in own else NOTHING
+        undisturbed: Any = own[CALM].dropna().to_numpy() if CALM in own else ()
+        calm = f"{scored(undisturbed).value:.2f}" if len(undisturbed) else NOTHING
         best = scores[EVERY] or scores["X"]
         rows.append((best.value if best else -1.0, (policy, f"{len(own)}", calm, *cells)))
     head = ("policy", "seeds", "undisturbed", *(GROUPS.get(group, group) for group in _GROUPS))

@@ -34,12 +34,12 @@ def axis_score(table: Any, axis: str) -> Estimate | None:
 
 
 def group_score(table: Any, group: str) -> Estimate | None:
-    """A policy's mean over the axes of a group that were run; None for none.
+    """A policy's mean over the axes of a group that were run; None where no seed has all of them.
 
     ``EVERY``: over the groups, but X and those that concern only policies with some channel.
     """
     seeds = _group(table, group)
-    return None if seeds is None else scored(seeds[~np.isnan(seeds)])
+    return None if seeds is None or np.isnan(seeds).all() else scored(seeds[~np.isnan(seeds)])
 
 
 def _group(table: Any, group: str) -> Float64 | None:
