@@ -6,6 +6,7 @@ import inspect
 import json
 import os
 import platform
+import re
 import uuid
 import zipfile
 import zlib
@@ -13,7 +14,6 @@ from collections.abc import Container, Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, NotRequired
-from urllib.parse import quote
 
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
@@ -42,8 +42,7 @@ _SOURCES = (
     "benchmark/**/*.py",
 )  # fmt: skip
 _LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
-_LONGEST_NAME = 200
-"""Longest name of a run [bytes]; file systems allow 255."""
+_LONGEST_NAME = 200  # file systems allow 255 bytes
 
 
 class ResultRow(NamedTuple):
@@ -230,15 +229,13 @@ class Results:
 
 def trace_path(folder: Path, scenario: str, policy: str, seed: int) -> Path:
     """Path of a run's time series."""
-    return folder / "traces" / f"{run_name(scenario, policy, seed)}.npz"
+    return folder / "traces" / f"{file_name(f'{scenario}.{policy}.{seed}')}.npz"
 
 
-def run_name(scenario: str, policy: str, seed: int) -> str:
-    """File name of a run without a suffix; a long name ends in a hash."""
-    name = f"{scenario}.{quote(policy, safe='')}.{seed}"
-    if len(name.encode()) > _LONGEST_NAME:
-        name = f"{name.encode()[: _LONGEST_NAME - 17].decode(errors='ignore')}-{_hash(name.encode())}"
-    return name
+def file_name(name: str, changes: object = ()) -> str:
+    """A name for a file: a short one with plain characters alone, and a hash of what this or ``changes`` hides."""
+    words = re.sub(r"[^\w.,=+-]", "_", name, flags=re.ASCII)[:_LONGEST_NAME]
+    return words if words == name and not changes else f"{words}.{_hash(repr((name, changes)).encode())[:8]}"
 
 
 def load_trace(path: UserPath) -> Trace:

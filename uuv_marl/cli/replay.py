@@ -1,9 +1,9 @@
 """``uuv-marl replay``: an episode as a page for the browser, or as a film."""
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -33,7 +33,7 @@ Write = Callable[["Sequence[Recording]", Path, Callable[[float], object]], objec
 def replay(
     run: Annotated[
         Path | None,
-        path_argument("Folder of a benchmark, or a trace of its seed 0. Without it the episode is simulated."),
+        path_argument("Folder of a benchmark, whose scenarios and policies are taken instead of named ones."),
     ] = None,
     scenario: Annotated[
         str | None, typer.Option(help=f"Name or TOML file. Default: {_SCENARIO}, or the folder's only scenario.")
@@ -45,7 +45,7 @@ def replay(
             f"Default: {_POLICY}, or the folder's only policy."
         ),
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the episode, for all policies. Default: 0.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the episode, for all policies.")] = 0,
     inspect: Annotated[
         list[int] | None,
         typer.Option(min=0, metavar="VEHICLE", help="Show this vehicle's sonar too. Repeat it for up to eight."),
@@ -58,8 +58,7 @@ def replay(
 ) -> None:
     """Show an episode: as one HTML file that works offline in any browser, or as a film.
 
-    The page has a time line with collisions and near misses, trails, zoom and plots. A simulated episode is shown at
-    every decision, a benchmark's saved seed 0 every 0.5 s, without forces and sonar.
+    The page has a time line with collisions and near misses, trails, zoom and plots.
 
     Example: uuv-marl replay --policy bio_inspired --policy sff --seed 3 --inspect 7
 
@@ -72,20 +71,13 @@ def replay(
         policies = list(dict.fromkeys(policy or []))
         if len(policies) > MOST_EPISODES:
             raise ReplayError(f"at most {MOST_EPISODES} policies can be shown side by side, got {len(policies)}")
-        if run is not None and (inspect or overrides):
-            raise ReplayError(
-                f"{run} holds saved episodes, which --inspect and --set can't change; leave out these two, or leave "
-                "out the folder and give --scenario, --policy and --seed"
-            )
+        start, policies = (
+            (scenario or _SCENARIO, policies or [_POLICY]) if run is None else _saved(run, scenario, policies)
+        )
         try:
             with progress_bar() as bar:
-                if run is None:
-                    recordings = _simulated(
-                        scenario or _SCENARIO, policies or [_POLICY], seed or 0, inspect or [], overrides or [], bar
-                    )
-                else:
-                    recordings = _saved(run, scenario, policies, seed)
-                path = output or _ready(_default(recordings))
+                recordings = _simulated(start, policies, seed, inspect or [], overrides or [], bar)
+                path = output or _ready(_default(recordings, overrides or []))
                 report = progress_line(bar, "writing")
                 write(recordings, path, report)
                 report(1.0)
@@ -132,23 +124,24 @@ def _ready(output: Path) -> Path:
             return output
 
 
-def _default(recordings: "Sequence[Recording]") -> Path:
-    from uuv_marl.benchmark.results import run_name
+def _default(recordings: "Sequence[Recording]", overrides: Sequence[str]) -> Path:
+    from uuv_marl.benchmark.results import file_name
 
     first, policies = recordings[0], "-".join(recording.policy for recording in recordings)
-    return Path("results/replay") / f"{run_name(first.scenario.name, policies, first.seed)}.html"
+    return Path("results/replay") / f"{file_name(f'{first.scenario.name}.{policies}.{first.seed}', overrides)}.html"
 
 
 def _simulated(
-    name: str, policies: Sequence[str], seed: int, inspect: Sequence[int], overrides: Sequence[str], bar: "Progress"
-) -> "list[Recording]":
+    start: str | dict[str, Any], policies: Sequence[str], seed: int, inspect: Sequence[int], overrides: Sequence[str],
+    bar: "Progress",
+) -> "list[Recording]":  # fmt: skip
     """An episode of each policy on the same seed; errors of all are raised before the first is simulated."""
     from uuv_marl.baselines import make_policy, with_policy_requirements
     from uuv_marl.replay.record import checked, record
     from uuv_marl.scenario import load_scenario
 
-    find_modules([name, *policies, *overrides])
-    scenario = load_scenario(name, overrides=changes_of(overrides))
+    find_modules([str(start), *policies, *overrides])
+    scenario = load_scenario(start, overrides=changes_of(overrides))
     checked(inspect, scenario)
     for policy in policies:
         make_policy(policy, with_policy_requirements(policy, scenario))
@@ -160,13 +153,21 @@ def _simulated(
     return recordings
 
 
-def _saved(run: Path, scenario: str | None, policies: Sequence[str], seed: int | None) -> "list[Recording]":
-    """Recordings from a benchmark's saved traces."""
+def _saved(folder: Path, scenario: str | None, policies: Sequence[str]) -> tuple[dict[str, Any], Sequence[str]]:
+    """A scenario of a benchmark's folder, and policies; the folder's only one by default."""
+    from uuv_marl.benchmark.results import FILE, read_content, source_fingerprint
     from uuv_marl.errors import ReplayError
-    from uuv_marl.replay.traces import from_folder, from_trace
 
-    if run.suffix != ".npz":
-        return [from_folder(run, scenario, policy, seed or 0) for policy in policies or [None]]
-    if scenario or policies or seed is not None:
-        raise ReplayError(f"{run} is one episode; leave out --scenario, --policy and --seed, or give the folder")
-    return [from_trace(run)]
+    def only(option: str, held: Collection[str]) -> str:
+        if len(held) != 1:
+            raise ReplayError(f"{folder} holds {', '.join(sorted(held)) or 'no runs'}; choose with {option}")
+        return next(iter(held))
+
+    content = read_content(folder / FILE, "give the folder of a benchmark, or --scenario and --policy alone")
+    if content["fingerprint"] != source_fingerprint():
+        say(f"{folder} comes from other code of uuv_marl, so that an episode may differ from the saved one.")
+    scenarios = content["scenarios"]
+    name = scenario or only("--scenario", scenarios)
+    if name not in scenarios:
+        raise ReplayError(f"{folder} holds no {name!r} but {', '.join(sorted(scenarios))}; choose with --scenario")
+    return scenarios[name], policies or [only("--policy", content["policies"])]
