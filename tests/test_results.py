@@ -269,7 +269,8 @@ def test_a_row_names_the_index_that_a_policy_acts_by(tmp_path):
     scenario, policies = quick("silent_targets"), ["nearest_target", "nearest_target,lanes=true"]
     results = Results(tmp_path, [scenario], traces=False)
     runner.run_missing(results, [scenario], policies, [0], lambda *a: None)
-    assert [row[1] for row in scenario_table(results, scenario, policies, [0]).rows] == ["–", "identity"]
+    rows = scenario_table(results, scenario, policies, [0]).rows
+    assert [row["class, and extra observations"] for row in rows] == ["–", "identity"]
 
 
 def keys(title):
