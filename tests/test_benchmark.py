@@ -170,7 +170,7 @@ def test_the_command_line_from_end_to_end(tmp_path):
     ("arguments", "message"),
     [
         (["benchmark", "--scenario=singel_obstacle"], "did you mean"),
-        (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must lie within 0.001 to 1,000,000"),
+        (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must be greater than or equal to 0.001"),
         (["list", "--show=trackin"], "did you mean"),
         (["list", "policies", "--show=sff"], "a policy has no file"),
         (["benchmark", "--set=actuators.yaw_damping_nms=600"], "every policy has its own"),

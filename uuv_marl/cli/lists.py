@@ -24,7 +24,7 @@ def show_list(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Print the file of this scenario or vehicle, such as lauv or remus100+munk_on, with all sources.",
+            help="Print the file of this scenario or vehicle, such as lauv, with all sources.",
         ),
     ] = None,
 ) -> None:

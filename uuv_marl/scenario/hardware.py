@@ -7,13 +7,14 @@ paper's Eq. 4.
 import math
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from uuv_marl.scenario import fields
 from uuv_marl.scenario.fields import Lag, NonNegative, NonPositive, Positive, Radius, Section, Signed, Speed, within
+from uuv_marl.types import Float64
 
 MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0  # widths of sub-sectors that the sonar's table of directions supports
-CHANNEL_NAMES = ("compass", "link", "current", "age", "ranged", "modem")  # channels of every task
 
 
 class Vehicle(Section):
@@ -156,6 +157,11 @@ class SonarArray(Section):
     """Largest distance of detected vehicles, and of detected obstacles' surfaces."""
     sub_sectors: Annotated[int, within(1, 64)]
     """k_a (Eq. 12)."""
+
+    @property
+    def bounds_rad(self) -> Float64:
+        """Edges of the sub-sectors, clockwise from the bow, shape (sub-sector + 1,)."""
+        return np.radians(self.mounting_deg + self.aperture_deg * np.linspace(-0.5, 0.5, self.sub_sectors + 1))
 
     def _check(self) -> None:
         width = self.aperture_deg / self.sub_sectors
