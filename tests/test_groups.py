@@ -11,7 +11,7 @@ from uuv_marl import load_scenario
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import aim
 from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
-from uuv_marl.envs.drawing.legend import _water
+from uuv_marl.envs.drawing.legend import signs_of
 from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.replay.encode import payload
 from uuv_marl.replay.record import record
@@ -45,7 +45,7 @@ def near(picture, at, colour, reach=2):
 
 
 def words(scene):
-    return [word for word, _ in _water(scene)]
+    return [word for word, _ in signs_of(scene)]
 
 
 def test_groups_that_swap_sides_have_colours_of_their_own_and_so_have_their_goals(swap):

@@ -1,13 +1,11 @@
 """Results on disk: every seed and metric, written after each run, so that a stopped benchmark can be resumed."""
 
-import functools
 import hashlib
 import inspect
 import json
 import os
 import platform
 import re
-import uuid
 import zipfile
 import zlib
 from collections.abc import Container, Iterable
@@ -262,8 +260,7 @@ def policy_info(policy: str) -> PolicyInfo:
     if isinstance(policy_type, Trained):
         source = policy_type.checkpoint.digest
     else:
-        file = inspect.getsourcefile(policy_type)
-        source = (_hash(Path(file).read_bytes()) if file else _unknown()) if ":" in policy else None
+        source = _file_hash(policy_type) if ":" in policy else None
     required = policy_requirements(policy)
     damping = required.yaw_damping_nms * (FULL_TORQUE_NM / required.full_torque_nm)
     known = PolicyInfo(channels=list(required.channels), yaw_damping_nms=damping, source=source)
@@ -285,28 +282,23 @@ def requirements_of(known: PolicyInfo) -> PolicyRequirements:
 def source_fingerprint() -> str:
     """Hash of everything that determines a run: code of the layers up to the benchmark's, and tuned gains."""
     code = sorted({path for pattern in _SOURCES for path in _PACKAGE.glob(pattern)})
-    if Path(__file__).resolve() not in code:
-        return _unknown()
     return _hash(
         b"".join(f"{path.relative_to(_PACKAGE).as_posix()}\0".encode() + path.read_bytes() + b"\0" for path in code)
     )
-
-
-@functools.cache
-def _unknown() -> str:
-    """A stand-in for a hash without source on disk, different in each process, so that no results are mixed."""
-    return f"unknown {uuid.uuid4().hex[:16]}"
 
 
 def _hash(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:16]
 
 
+def _file_hash(kind: type) -> str:
+    """Hash of the file that defines a class."""
+    return _hash(Path(inspect.getfile(kind)).read_bytes())
+
+
 def _tasks(scenarios: Iterable[Scenario]) -> dict[str, str]:
     """Hash of the file of each user-defined task, by its name."""
-    named = {scenario.task.name: scenario.task_class for scenario in scenarios if ":" in scenario.task.name}
-    files = {name: inspect.getsourcefile(task) for name, task in named.items()}
-    return {name: _hash(Path(file).read_bytes()) if file else _unknown() for name, file in files.items()}
+    return {each.task.name: _file_hash(each.task_class) for each in scenarios if ":" in each.task.name}
 
 
 def _versions() -> dict[str, str]:

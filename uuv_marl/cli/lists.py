@@ -65,7 +65,7 @@ def _scenarios() -> Table:
 
 
 def _vehicles() -> Table:
-    from uuv_marl.benchmark.handling import alone, changes, every, turn
+    from uuv_marl.benchmark.handling import alone, every, turn
 
     table = Table("name", "length [m]", "mass [kg]", "top speed [m/s]", "turn", "source")
     for name in every():
@@ -74,7 +74,7 @@ def _vehicles() -> Table:
         top, rate, radius = turn(scenario)
         how = f"{rate:.0f} deg/s" + (f", radius {radius:.1f} m" if radius > 0.01 else " on the spot")
         length = "-" if hull.length_m is None else f"{hull.length_m:g}"
-        source = f"variant: {', '.join(changes(name))}" if "+" in name else hull.source
+        source = f"variant: --show {name.partition('+')[0]}" if "+" in name else hull.source
         table.add_row(name, length, f"{hull.m_kg:g}", f"{top:.2f}", how, source)
     return table
 
