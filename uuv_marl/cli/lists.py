@@ -4,10 +4,9 @@ from enum import StrEnum
 from typing import Annotated
 
 import typer
-from rich.syntax import Syntax
 from rich.table import Table
 
-from uuv_marl.cli.console import console, explained
+from uuv_marl.cli.console import console, explained, say
 
 
 class ListKind(StrEnum):
@@ -36,7 +35,7 @@ def show_list(
     """
     with explained():
         if show is not None:
-            _print_toml(_file(what, show))
+            say(_file(what, show))
             return
         tables = {ListKind.SCENARIOS: _scenarios, ListKind.VEHICLES: _vehicles, ListKind.POLICIES: _policies}
         for kind, table in tables.items():
@@ -91,12 +90,3 @@ def _policies() -> Table:
         beyond = [*required.channels, *(["identity"] if required.identity else [])]
         table.add_row(name, ", ".join(beyond) or "-", f"{required.yaw_damping_nms:g}", every, what)
     return table
-
-
-def _print_toml(text: str) -> None:
-    console.print(
-        Syntax(text, "toml", background_color="default") if console.is_terminal else text,
-        markup=False,
-        highlight=False,
-        soft_wrap=True,
-    )

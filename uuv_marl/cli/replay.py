@@ -1,7 +1,7 @@
 """``uuv-marl replay``: an episode as a page for the browser, or as a film."""
 
 import tempfile
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from uuv_marl.replay.recording import Recording
 
 _SCENARIO, _POLICY = "single_obstacle", "bio_inspired"
-
-Write = Callable[["Sequence[Recording]", Path, Callable[[float], object]], object]
 
 
 def replay(
@@ -67,7 +65,7 @@ def replay(
     with explained():
         from uuv_marl.errors import ReplayError
 
-        write = _writer(output, inspect or [])
+        is_film = _is_film(output, inspect or [])
         policies = list(dict.fromkeys(policy or []))
         if len(policies) > MOST_EPISODES:
             raise ReplayError(f"at most {MOST_EPISODES} policies can be shown side by side, got {len(policies)}")
@@ -79,7 +77,14 @@ def replay(
                 recordings = _simulated(start, policies, seed, inspect or [], overrides or [], bar)
                 path = output or _ready(_default(recordings, overrides or []))
                 report = progress_line(bar, "writing")
-                write(recordings, path, report)
+                if is_film:
+                    from uuv_marl.replay.film import write_film
+
+                    write_film(recordings, path, sonar_of=inspect[0] if inspect else None, progress=report)
+                else:
+                    from uuv_marl.replay.page import write_page
+
+                    write_page(recordings, path)
                 report(1.0)
         except KeyboardInterrupt:
             say("Stopped; nothing was written.")
@@ -87,8 +92,8 @@ def replay(
         say(f"Replay: {path} ({path.stat().st_size / 1000:,.0f} kB)")
 
 
-def _writer(output: Path | None, inspect: Sequence[int]) -> Write:
-    """The function that writes a file with this suffix. Raises ReplayError before anything is simulated."""
+def _is_film(output: Path | None, inspect: Sequence[int]) -> bool:
+    """Whether a file of this suffix is a film. Raises ReplayError before anything is simulated."""
     from uuv_marl.errors import ReplayError
 
     suffix = ".html" if output is None else output.suffix.lower()
@@ -97,18 +102,13 @@ def _writer(output: Path | None, inspect: Sequence[int]) -> Write:
     if output is not None:
         _ready(output)
     if suffix == ".html":
-        from uuv_marl.replay.page import write_page
-
-        return lambda recordings, path, _: write_page(recordings, path)
+        return False
     if len(inspect) > 1:
         raise ReplayError(f"a film shows the sonar of one vehicle, got {len(inspect)}; give one --inspect, or .html")
-    from uuv_marl.replay.film import check_format, write_film
+    from uuv_marl.replay.film import check_format
 
     check_format(Path(f"film{suffix}"))
-
-    return lambda recordings, path, report: write_film(
-        recordings, path, sonar_of=inspect[0] if inspect else None, progress=report
-    )
+    return True
 
 
 def _ready(output: Path) -> Path:

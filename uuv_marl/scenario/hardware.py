@@ -165,15 +165,11 @@ class SonarArray(Section):
 
     def _check(self) -> None:
         width = self.aperture_deg / self.sub_sectors
-        if width > MAX_SECTOR_DEG:
+        if not MIN_SECTOR_DEG <= width <= MAX_SECTOR_DEG:
             raise ValueError(
-                f"sonar.arrays.{self.name}.sub_sectors must leave sub-sectors of at most {MAX_SECTOR_DEG:g} deg, "
-                f"got {width:g} deg; use at least {math.ceil(self.aperture_deg / MAX_SECTOR_DEG)}"
-            )
-        if width < MIN_SECTOR_DEG:
-            raise ValueError(
-                f"sonar.arrays.{self.name}.sub_sectors must leave sub-sectors of at least {MIN_SECTOR_DEG:g} deg, "
-                f"got {width:g} deg; lower it or raise aperture_deg"
+                f"sonar.arrays.{self.name}.sub_sectors must leave sub-sectors of {MIN_SECTOR_DEG:g} to "
+                f"{MAX_SECTOR_DEG:g} deg, got {width:g} deg; use at least "
+                f"{math.ceil(self.aperture_deg / MAX_SECTOR_DEG)} and at most {self.aperture_deg / MIN_SECTOR_DEG:.0f}"
             )
 
 
