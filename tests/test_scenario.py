@@ -135,7 +135,7 @@ BAD = [
     ({"actuators.yaw_damping_nms": 2000.0}, "actuators.yaw_damping_nms = 2000 is unstable .* use less than 1600"),
     ({"vehicle.x_G_m": 1.0}, "not positive definite"),
     ({"vehicle.Y_r": 500.0}, "lets linear damping add energy"),
-    ({"vehicle.N_vv": -900.0}, "vehicle.N_vv = -900 lets quadratic damping add energy; lower its size, or raise"),
+    ({"vehicle.N_vv": -900.0}, "vehicle.N_vv = -900 let quadratic damping add energy; lower their sizes, or raise"),
     ({"vehicle.Y_uv": 5.0}, "vehicle.Y_uv = 5, .* are a lift that adds energy to sway and yaw; keep"),
     (SUMS, "N_uv = -24 and N_ur = -2 are a lift that adds energy .* give the lift's part alone"),
     ({"actuators.N_uud": 3.0}, "actuators.N_uud = 3 is a rudder's, and actuators.kind is 'force_torque'; set it to 0"),

@@ -6,9 +6,7 @@ differences, then repeatedly the samples halfway between by their difference fro
 Series and the map are exact: they keep all bits of their float32.
 """
 
-import base64
 import math
-import zlib
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 
 from uuv_marl import __version__
 from uuv_marl.envs.drawing.camera import shown_speed
+from uuv_marl.replay.html import deflated
 from uuv_marl.replay.recording import Recording
 from uuv_marl.scenario import conditions, growth
 from uuv_marl.types import Bool, Float32, Float64, Int32, Int64
@@ -218,5 +217,4 @@ def pack(values: Int32) -> str:
     unsigned = ((values << 1) ^ (values >> 31)).view(np.uint32)
     planes = max(1, math.ceil(int(unsigned.max(initial=0)).bit_length() / 8))
     rows = unsigned.astype("<u4").view(np.uint8).reshape(-1, 4).T[:planes]
-    deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS, 6, zlib.Z_FILTERED)
-    return base64.b64encode(deflate.compress(np.ascontiguousarray(rows).tobytes()) + deflate.flush()).decode("ascii")
+    return deflated(rows.tobytes())

@@ -60,18 +60,10 @@ def _check_damping(p: Vehicle) -> None:
             f"vehicle.Y_r + vehicle.N_v = {p.Y_r + p.N_v:g} lets linear damping add energy; "
             f"keep its size within 2 sqrt(Y_v N_r) = {2 * math.sqrt(p.Y_v * p.N_r):g}"
         )
-    coupling = abs(p.Y_rr + p.N_rv)
-    # Y_vv s^3 - c s + N_rr >= 0 for all s = |v / r| >= 0; the minimum lies at s = sqrt(c / (3 Y_vv)).
-    bound = 3 * (p.Y_vv * p.N_rr**2 / 4) ** (1 / 3)
-    if coupling > bound:
+    if _least_power(p) < -1e-12 * max(p.Y_vv, p.N_rr):
         raise ValueError(
-            f"vehicle.Y_rr + vehicle.N_rv = {p.Y_rr + p.N_rv:g} lets quadratic damping add energy; "
-            f"keep its size within {bound:g}"
-        )
-    if p.N_vv and _least_power(p) < -1e-9 * max(p.Y_vv, p.N_rr):
-        raise ValueError(
-            f"vehicle.N_vv = {p.N_vv:g} lets quadratic damping add energy; lower its size, or raise vehicle.Y_vv = "
-            f"{p.Y_vv:g} or vehicle.N_rr = {p.N_rr:g}"
+            f"vehicle.Y_rr + vehicle.N_rv = {p.Y_rr + p.N_rv:g} and vehicle.N_vv = {p.N_vv:g} let quadratic damping "
+            f"add energy; lower their sizes, or raise vehicle.Y_vv = {p.Y_vv:g} or vehicle.N_rr = {p.N_rr:g}"
         )
     for linear, quadratic in (("X_u", "X_uu"), ("N_r", "N_rr")):
         if max(getattr(p, linear), getattr(p, quadratic)) == 0:
@@ -82,11 +74,12 @@ def _check_damping(p: Vehicle) -> None:
 
 def _least_power(p: Vehicle) -> float:
     """Least power of quadratic sway and yaw damping, over |r|^3, for all ratios v / r; -inf without a bound."""
-    if p.Y_vv == 0.0:
-        return -math.inf  # -N_vv s^2 is more than all else for some sign of v and large s = |v / r|
+    coupling = p.Y_rr + p.N_rv
+    if p.Y_vv == 0.0 and (coupling or p.N_vv):
+        return -math.inf  # for some sign of v and large s = |v / r|
     least = p.N_rr
     for sign in (1.0, -1.0):
-        power = np.polynomial.Polynomial([p.N_rr, -sign * (p.Y_rr + p.N_rv), -sign * p.N_vv, p.Y_vv])
+        power = np.polynomial.Polynomial([p.N_rr, -sign * coupling, -sign * p.N_vv, p.Y_vv])
         lowest = [s.real for s in power.deriv().roots() if s.imag == 0.0 and s.real > 0.0]
         least = min([least, *(float(power(s)) for s in lowest)])
     return least
@@ -118,31 +111,21 @@ def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float)
     h, rate = timing.integration_step_s, _damping_rate(p, limits, speed_mps)
     if not rate * h < RK4_LIMIT:
         step_s = timing.control_step_s / math.ceil(timing.control_step_s * rate / RK4_LIMIT)
-        steers = f"max_torque_nm = {limits.max_torque_nm:g}"
-        if limits.kind == "rudder":
-            steers = f"rudder_max_deg = {limits.rudder_max_deg:g}"
         raise ValueError(
-            f"timing.integration_step_s = {h:g} is too long for this vehicle, so that Runge-Kutta diverges "
-            f"under actuators.max_force_n = {limits.max_force_n:g} and {steers}; use at most {step_s:.3g}, or "
-            "lower these limits, the vehicle's resistances or its added masses"
+            f"timing.integration_step_s = {h:g} is too long for this vehicle, so that Runge-Kutta diverges; use at "
+            f"most {step_s:.3g}, or lower the actuators' limits, the vehicle's resistances or its added masses"
         )
 
 
 def _damping_rate(p: Vehicle, limits: Actuators, speed_mps: float) -> float:
     """Damping rate [1/s] at the largest speeds under full force and torque, or at the start."""
     u = max(top_speed(p, limits), speed_mps)
-    r = _terminal(p.N_r, p.N_rr, _most_moment(limits, u))
+    rudder_nm = limits.rudder[1] * math.radians(limits.rudder_max_deg) * u**2
+    r = _terminal(p.N_r, p.N_rr, limits.max_torque_nm if limits.kind == "force_torque" else rudder_nm)
     sway = [p.Y_v + 2 * p.Y_vv * u - p.Y_uv * u, -p.Y_r - 2 * p.Y_rr * r - p.Y_ur * u]
     yaw = [-p.N_v - p.N_rv * r - 2 * p.N_vv * u - p.N_uv * u, p.N_r + 2 * p.N_rr * r - p.N_ur * u]
     sway_yaw = float(np.abs(np.linalg.eigvals(np.linalg.solve(inertia_matrix(p)[1:, 1:], [sway, yaw]))).max())
     return max(sway_yaw, (p.X_u + 2 * p.X_uu * u) / (p.m_kg - p.X_udot_kg))
-
-
-def _most_moment(limits: Actuators, speed_mps: float) -> float:
-    """Largest steering yaw moment [N m] at a speed ahead [m/s]."""
-    if limits.kind == "force_torque":
-        return limits.max_torque_nm
-    return limits.rudder[1] * math.radians(limits.rudder_max_deg) * speed_mps**2
 
 
 def resistance(p: Vehicle) -> Float64:
