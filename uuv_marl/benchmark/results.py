@@ -138,15 +138,12 @@ class Results:
 
     def _continue(self, content: Content) -> None:
         elsewhere = "move it away or give another --output"
-        if content["fingerprint"] != self._fingerprint:
-            raise ResultsError(
-                f"{self._path} comes from other code of uuv_marl; {elsewhere}, so that no table mixes the two"
-            )
-        for library, this_version in self._versions.items():
-            if (saved_version := content["versions"].get(library, this_version)) != this_version:
+        saved = content["versions"] | {"code": content["fingerprint"]}
+        for what, here in (self._versions | {"code": self._fingerprint}).items():
+            if saved.get(what, here) != here:
                 raise ResultsError(
-                    f"{self._path} comes from {library} {saved_version}, and here is {this_version}; {elsewhere}, so "
-                    "that no table mixes the two"
+                    f"{self._path} comes from {what} {saved[what]}, and here is {here}; {elsewhere}, so that no table "
+                    "mixes the two"
                 )
         for name, dump in self._dumps.items():
             if content["scenarios"].get(name, dump) != dump:

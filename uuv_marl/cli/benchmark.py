@@ -27,8 +27,6 @@ _NEXT = (
     'Next: look at the pictures; read the numbers in Python with uuv_marl.benchmark.load("{output}"), which needs the '
     'extra "analysis".'
 )
-_TRAIN = """Train a policy for this scenario, and compare it with --policy runs/mine/best:
-  uuv-marl train {scenario} --minutes 5 --output runs/mine"""
 
 
 def benchmark(
@@ -59,7 +57,7 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
+        from uuv_marl.baselines import make_policy, with_policy_requirements
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.benchmark.tables import terminal_table
@@ -93,8 +91,6 @@ def benchmark(
         say(_WORST.format(worst=worst))
         say(f"  {again}")
         say(_NEXT.format(output=output))
-        if set(policies) <= {*POLICIES} and names == ["starter"] and not overrides:
-            say(_TRAIN.format(scenario=files[0]))
 
 
 def tune_command(
