@@ -248,7 +248,8 @@ def test_the_command_shows_the_runs_of_a_benchmark(tmp_path, monkeypatch, writte
             row.metrics for name in ("random", "idle") for row in results.select("lossy", name, [recordings[0].seed])
         ]
     assert recordings[0].seed == 1
-    assert "choose with --policy" in replay("out")[1]
+    assert replay("out")[0] == 0
+    assert [one.policy for one in written[-1][0]] == ["idle", "random"]
     assert "holds no 'starter' but lossy; choose with --scenario" in replay("out", "--scenario=starter")[1]
 
 

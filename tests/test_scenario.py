@@ -168,7 +168,7 @@ BAD_SEA = [
     ({"faults": "yaw"}, "faults must be a list, got 'yaw'"),
     ({"faults": [{"kind": "yaw"}]}, "faults.0.share is missing; give it"),
     ({"faults": [MEMBER | {"efficency": 0.5}]}, "faults.0.efficency is unknown; did you mean 'faults.0.efficiency'"),
-    ({"faults": [MEMBER | {"efficiency": 0.5}]}, "efficiency is only for kinds thruster and yaw, got 0.5 .*leave"),
+    ({"faults": [MEMBER | {"efficiency": 0.5}]}, "faults.efficiency is of no use to kind member, got 0.5; leave"),
     ({"faults": [MEMBER | {"duration_s": 5.0}]}, "faults.duration_s is of no use to kind member, got 5.*leave it out"),
     ({"faults": [MEMBER | {"array": "bow"}]}, "faults.array must be given for kind array and for no other kind"),
     ({"faults": [ARRAY | {"array": "stern"}]}, "faults.0.array must be one of bow, port, starboard, got 'stern'"),

@@ -234,7 +234,7 @@ def file_name(name: str, changes: object = ()) -> str:
 
 
 def load_trace(path: UserPath) -> Trace:
-    """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
+    """A run's time series: those of ``metrics.measure`` and ``obstacle_distance_m``.
 
     Also ``obstacles`` and ``waypoints``, and where trajectories are kept the fields of ``evaluate.Routes`` as
     ``route_time_s`` and so on; docs/benchmark.md has shapes and units.

@@ -22,12 +22,6 @@ from uuv_marl.cli.console import (
     working,
 )  # fmt: skip
 
-_WORST = "The worst episode (by collisions, arrival, distance) is seed {worst.seed} of {worst.policy}. To watch it:"
-_NEXT = (
-    'Next: look at the pictures; read the numbers in Python with uuv_marl.benchmark.load("{output}"), which needs the '
-    'extra "analysis".'
-)
-
 
 def benchmark(
     scenario: Annotated[
@@ -88,9 +82,11 @@ def benchmark(
             say(f"  {path}")
         worst = runner.worst(results, scenarios, policies, wanted)
         again = command(files[names.index(worst.scenario)], worst.policy, worst.seed, overrides or [])
-        say(_WORST.format(worst=worst))
+        say(
+            f"The worst episode (by collisions, arrival, distance) is seed {worst.seed} of {worst.policy}. To watch it:"
+        )
         say(f"  {again}")
-        say(_NEXT.format(output=output))
+        say(f'Next: read the numbers in Python with uuv_marl.benchmark.load("{output}"): needs the extra "analysis".')
 
 
 def tune_command(

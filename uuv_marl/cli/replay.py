@@ -1,7 +1,7 @@
 """``uuv-marl replay``: an episode as a page for the browser, or as a film."""
 
 import tempfile
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,13 +34,13 @@ def replay(
         path_argument("Folder of a benchmark, whose scenarios and policies are taken instead of named ones."),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option(help=f"Name or TOML file. Default: {_SCENARIO}, or the folder's only scenario.")
+        str | None, typer.Option(help=f"Name or TOML file. Default: {_SCENARIO}, or the folder's first.")
     ] = None,
     policy: Annotated[
         list[str] | None,
         typer.Option(
             help="Name, checkpoint (runs/starter/best) or module:Class. Repeat it for up to four side by side. "
-            f"Default: {_POLICY}, or the folder's only policy."
+            f"Default: {_POLICY}, or the folder's first four."
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the episode, for all policies.")] = 0,
@@ -154,20 +154,15 @@ def _simulated(
 
 
 def _saved(folder: Path, scenario: str | None, policies: Sequence[str]) -> tuple[dict[str, Any], Sequence[str]]:
-    """A scenario of a benchmark's folder, and policies; the folder's only one by default."""
+    """A scenario of a benchmark's folder, and policies, by default the first ones."""
     from uuv_marl.benchmark.results import FILE, read_content, source_fingerprint
     from uuv_marl.errors import ReplayError
-
-    def only(option: str, held: Collection[str]) -> str:
-        if len(held) != 1:
-            raise ReplayError(f"{folder} holds {', '.join(sorted(held)) or 'no runs'}; choose with {option}")
-        return next(iter(held))
 
     content = read_content(folder / FILE, "give the folder of a benchmark, or --scenario and --policy alone")
     if content["fingerprint"] != source_fingerprint():
         say(f"{folder} comes from other code of uuv_marl, so that an episode may differ from the saved one.")
     scenarios = content["scenarios"]
-    name = scenario or only("--scenario", scenarios)
+    name = scenario or min(scenarios)
     if name not in scenarios:
         raise ReplayError(f"{folder} holds no {name!r} but {', '.join(sorted(scenarios))}; choose with --scenario")
-    return scenarios[name], policies or [only("--policy", content["policies"])]
+    return scenarios[name], policies or sorted(content["policies"])[:MOST_EPISODES]

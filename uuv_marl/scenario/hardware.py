@@ -120,22 +120,20 @@ class Actuators(Section):
         return side * self.Y_uud, side * self.N_uud
 
     def _check(self) -> None:
-        fin = {name: getattr(self, name) for name in ("Y_uud", "N_uud", "rudder_max_deg")}
-        if self.kind == "force_torque":
-            set_one = next((name for name, value in fin.items() if value), None)
-            if set_one:
+        rudder = self.kind == "rudder"
+        for name in ("Y_uud", "N_uud", "rudder_max_deg"):
+            value = getattr(self, name)
+            if value and not rudder:
                 raise ValueError(
-                    f"actuators.{set_one} = {fin[set_one]:g} is a rudder's, and actuators.kind is 'force_torque'; set "
-                    "it to 0, or actuators.kind = 'rudder'"
+                    f"actuators.{name} = {value:g} is a rudder's, and actuators.kind is 'force_torque'; set it to 0, "
+                    "or actuators.kind = 'rudder'"
                 )
-            return
-        for name in ("N_uud", "rudder_max_deg"):
-            if not fin[name]:
+            if rudder and not value and name != "Y_uud":
                 raise ValueError(
                     f"actuators.{name} must not be 0 where actuators.kind is 'rudder': it would never turn; set it, or "
                     "actuators.kind = 'force_torque'"
                 )
-        if self.yaw_damping_nms > 0.0:
+        if rudder and self.yaw_damping_nms > 0.0:
             raise ValueError(
                 f"actuators.yaw_damping_nms must be 0 where actuators.kind is 'rudder', got {self.yaw_damping_nms:g}: "
                 "a rudder has no torque of its own to damp with; set it to 0"

@@ -136,8 +136,4 @@ def _echo(fine: pygame.Surface, unit: float) -> None:
 
 
 def _patch(colour: ink.Colour) -> Sign:
-    def draw(fine: pygame.Surface, unit: float) -> None:
-        fine.fill(colour)
-        pygame.draw.rect(fine, ink.EDGE, fine.get_rect(), round(unit))
-
-    return draw
+    return lambda fine, unit: (fine.fill(colour), pygame.draw.rect(fine, ink.EDGE, fine.get_rect(), round(unit)))
