@@ -45,6 +45,7 @@ class Scenes:
         past = np.unique(np.searchsorted(recording.time_s, now - self._back_s))
         series = {name: float(values[k]) for name, values in recording.series.items()}
         arrival_s = recording.metrics["task_time_s"]
+        water, core_m = recording.water, recording.scenario.current.eddy_core_m
         return Scene(
             scenario=recording.scenario,
             waypoints=recording.waypoints,
@@ -61,19 +62,12 @@ class Scenes:
             hits=self._hits[self._hits[:, 2] <= now],
             arrival_s=arrival_s if arrival_s is not None and arrival_s <= now else None,
             collisions=round(series["collisions"]),
-            min_spacing_m=_distance(series["min_spacing_m"]),
-            clearance_m=_distance(series["obstacle_clearance_m"]),
+            min_spacing_m=float(np.nan_to_num(series["min_spacing_m"], nan=np.inf)),
+            clearance_m=float(np.nan_to_num(series["obstacle_clearance_m"], nan=np.inf)),
             centre_error_m=series["centre_error_m"],
             sonar=self._sonar(k),
-            water=self._water(k),
+            water=water and FlowField(water.drift[k].astype(np.float64), water.eddies, core_m),
         )
-
-    def _water(self, k: int) -> FlowField | None:
-        recording = self.recording
-        if recording.water is None:
-            return None
-        core_m = recording.scenario.current.eddy_core_m
-        return FlowField(recording.water.drift[k].astype(np.float64), recording.water.eddies, core_m)
 
     def _sonar(self, k: int) -> SonarView | None:
         i = self._sonar_of
@@ -81,8 +75,3 @@ class Scenes:
             return None
         inspection = self.recording.inspections[i]
         return SonarView(i, inspection.neighbour[k][inspection.detected_index[k] >= 0], inspection.echo_range[k])
-
-
-def _distance(metres: float) -> float:
-    """The distance, infinite for NaN."""
-    return metres if np.isfinite(metres) else np.inf

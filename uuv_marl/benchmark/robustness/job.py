@@ -92,7 +92,10 @@ def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> P
     suite = Suite(folder / "cells", traces=False)
     suite.run([case for _, _, case in planned], report, restart=restart)
     path = folder / EPISODES
-    write_episodes(path, (row for cell in planned for row in _rows(suite, *cell)))
+    rows = [row for cell in planned for row in _rows(suite, *cell)]
+    with replacing(path) as partial:
+        frame = import_pandas("uuv-marl robustness").DataFrame.from_records(rows)
+        frame.to_csv(partial, index=False, float_format=f"%{DIGITS}")
     return path
 
 
@@ -103,13 +106,6 @@ def _rows(suite: Suite, axis: str, level: int, case: Case) -> Iterator[dict[str,
         yield {**place, "seed": row.seed, **{name: metrics[name] for name in METRICS}}
 
 
-def write_episodes(path: Path, rows: Iterator[dict[str, Any]]) -> None:
-    """Write rows of scenario, axis, level, policy, seed and metrics as CSV, with six significant digits."""
-    pandas = import_pandas("uuv-marl robustness")
-    with replacing(path) as partial:
-        pandas.DataFrame.from_records(list(rows)).to_csv(partial, index=False, float_format=f"%{DIGITS}")
-
-
 def read_episodes(path: Path) -> Any:
-    """Read the file of ``write_episodes`` as a pandas data frame."""
+    """Read the file of ``run`` as a pandas data frame."""
     return import_pandas("uuv-marl robustness").read_csv(path, dtype={"axis": str, "policy": str, "scenario": str})
