@@ -14,8 +14,8 @@ from uuv_marl.baselines.safety import Barrier
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.estimates import estimate
 from uuv_marl.benchmark.evaluate import episodes
-from uuv_marl.benchmark.results import Results, ResultsError
-from uuv_marl.benchmark.tables import Table, terminal_table
+from uuv_marl.benchmark.results import PolicyInfo, Results, ResultsError
+from uuv_marl.benchmark.tables import scenario_table, terminal_table
 from uuv_marl.cli import app
 from uuv_marl.errors import PolicyError
 
@@ -150,7 +150,7 @@ def test_the_command_line_from_end_to_end(tmp_path):
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
     assert "bio_inspired" in done.output
-    assert "task time [s]" in done.output  # brackets are not markup
+    assert "[s]" in done.output  # brackets are not markup
     data = json.loads((tmp_path / "results.json").read_text())
     assert {(r["scenario"], r["policy"], r["seed"]) for r in data["runs"]} == {
         (s, p, k) for s in ("lossy", "tracking") for p in ("bio_inspired", "random") for k in range(3)
@@ -181,7 +181,7 @@ def test_the_parameters_listed_are_those_that_a_policy_s_name_takes(name):
     ("arguments", "message"),
     [
         (["benchmark", "--scenario=singel_obstacle"], "did you mean"),
-        (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must lie within 0.001 to 1,000,000"),
+        (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must be greater than or equal to 0.001"),
         (["list", "--show=trackin"], "did you mean"),
         (["list", "policies", "--show=sf"], "did you mean 'sff'"),
         (["benchmark", "--set=actuators.yaw_damping_nms=600"], "every policy has its own"),
@@ -234,19 +234,28 @@ def test_a_search_is_resumed_and_repeats_itself(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("width", [80, 88, 100, 130])
-def test_a_tasks_table_fits_its_width_with_no_letter_cut(width):
-    columns = load_scenario("hard_water").task_class.columns
-    headers = ("policy", "class, and extra observations", "swarm success", "success", *columns,
-               "obstacle distance [m]", "worst", "spacing [m]", "worst", "collisions")  # fmt: skip
-    row = ("mine:Dodge", "end to end", "3/5", "86.0%", "1.17 [1.09, 1.30]", "4.63 [3.9, 5.15]", "1.26",
-           "7.31 [6.77, 8.02]", "3.46", "13 in 3 seeds")  # fmt: skip
-    rows = [row, ("runs/easy/best_of_many", *row[1:])]
-    table = terminal_table(Table("hard_water_easy", headers, rows, "Caption."), width)
+@pytest.mark.parametrize("scenario", ["single_obstacle", "hard_water"])
+def test_a_table_fits_its_width_with_no_letter_cut_and_explains_what_it_shows(tmp_path, scenario, width):
+    metrics = next(run for run in episodes(quick(scenario), "idle", [0])).metrics
+    results = Results(tmp_path, [load_scenario(scenario)], traces=False)
+    for policy in ("mine:Dodge", "runs/easy/best_of_many"):
+        results.policies[policy] = PolicyInfo(channels=["compass"], yaw_damping_nms=0.0, source=None)
+        results._runs |= {(scenario, policy, seed): metrics for seed in range(5)}
+    table = scenario_table(results, results.scenarios[scenario], [*results.policies], range(5))
     out = Console(width=width, file=io.StringIO())
-    out.print(table)
+    out.print(terminal_table(table, width))
     text = out.file.getvalue()
     assert max(map(len, text.splitlines())) <= width
     lines = [line for line in text.splitlines() if "│" in line]
     assert all(line.rstrip()[-1] == "│" for line in lines)
-    cells = ["".join(line.split("│")[k + 1].strip() for line in lines[:4]) for k in range(len(row))]
-    assert all("".join(cell.split()) in "".join(found.split()) for cell, found in zip(row, cells, strict=True))
+    cells = ["".join(parts) for parts in zip(*(line.split("│") for line in lines), strict=True)]
+    shown = "".join("".join(cell.split()) for cell in cells)
+    for name, cell in table.rows[0].items():
+        if name not in ("worst time [s]", "mean spacing [m]", "within Eq. 7"):
+            assert "".join(cell.partition(" [")[0].replace("–", "-").split()) in shown, name
+    assert "interval" not in text
+    assert ("SFF" in text) == (scenario == "single_obstacle")
+    assert "Eq. 7" not in text
+    full = table.caption()
+    assert "95 % bootstrap interval" in full
+    assert ("Eq. 7" in full) == (scenario == "single_obstacle")

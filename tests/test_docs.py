@@ -126,7 +126,7 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
         "benchmark.tuning.tune",
         "benchmark.robustness.job.run",
         "replay.record.record",
-        "replay.traces.from_folder",
+        "benchmark.results.read_content",
     ):
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
     for work in ("paper.reproduce.make", "dynamics.__main__.identify", "heldout.__main__.run", "verify.check.check"):

@@ -4,21 +4,18 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from tests.test_rendering import SIZE, played
 from tests.test_tasks import TWO
 from uuv_marl import load_scenario
-from uuv_marl.cli import app
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import aim
 from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
-from uuv_marl.envs.drawing.legend import _water
+from uuv_marl.envs.drawing.legend import signs_of
 from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.replay.encode import payload
 from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
-from uuv_marl.replay.traces import from_folder
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.groups import groups_of
 
@@ -48,7 +45,7 @@ def near(picture, at, colour, reach=2):
 
 
 def words(scene):
-    return [word for word, _ in _water(scene)]
+    return [word for word, _ in signs_of(scene)]
 
 
 def test_groups_that_swap_sides_have_colours_of_their_own_and_so_have_their_goals(swap):
@@ -110,18 +107,11 @@ def test_one_group_of_informed_vehicles_is_drawn_as_ever(few):
 
 
 @pytest.mark.parametrize("name", ["two_swarms", "few_informed_easy"])
-def test_recordings_traces_and_pages_know_the_groups(name, tmp_path):
-    sets = [f"--set={field}={value}" for field, value in SHORT.items()]
-    ran = CliRunner().invoke(
-        app, ["benchmark", "--scenario", name, "--policy", "idle", "--seeds", "1", "--output", str(tmp_path), *sets]
-    )
-    assert ran.exit_code == 0, ran.output
-    whole, trace = record(load_scenario(name, overrides=SHORT), "idle", 0), from_folder(tmp_path, name, "idle", 0)
-    at = np.searchsorted(whole.time_s, trace.time_s)
-    np.testing.assert_array_equal(trace.references, whole.references[at])
+def test_recordings_and_pages_know_the_groups(name):
+    whole = record(load_scenario(name, overrides=SHORT), "idle", 0)
     swarm = Swarm(whole.scenario)
     swarm.reset(0)
-    for one in (whole, trace, Scenes(whole).at(3.0)):
+    for one in (whole, Scenes(whole).at(3.0)):
         for got, wanted in zip(one.groups[:2], groups_of(swarm)[:2], strict=True):
             np.testing.assert_array_equal(got, wanted)
         wanted = [0] * 20 + [1] * 20 if name == "two_swarms" else [None]

@@ -111,8 +111,8 @@ def test_there_is_along_the_free_way():
     ({"task.gate.gap_m": [20.0, 10.0]}, r"task.gate.gap_m must be \[low, high\] with low <= high, got \[20.0, 10.0\]"),
     ({"task.bar.hole_m": 3.0}, "task.bar.hole_m is unknown"),
     ({"task.length_m": [150.0, 400.0]}, r"task.length_m must be at least 167, task.first_wall_m and task.goal_clear_m"),
-    ({"task.piles.apart_m": [0.0, 0.0]}, "task.piles.apart_m.0 must lie within 0.001"),
-    ({"task.bar.radius_m": [0.0, 2.0]}, "task.bar.radius_m.0 must lie within 0.001"),
+    ({"task.piles.apart_m": [0.0, 0.0]}, "task.piles.apart_m.0 must be greater than or equal to 0.001"),
+    ({"task.bar.radius_m": [0.0, 2.0]}, "task.bar.radius_m.0 must be greater than or equal to 0.001"),
 ])  # fmt: skip
 def test_numbers_that_can_not_be_are_refused(changes, message):
     with pytest.raises(ScenarioError, match=message):

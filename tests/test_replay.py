@@ -20,10 +20,8 @@ from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
-from uuv_marl.errors import ReplayError, ResultsError
 from uuv_marl.replay.encode import CODINGS, payload, unwrapped
 from uuv_marl.replay.record import record
-from uuv_marl.replay.traces import from_folder, from_trace
 from uuv_marl.sim.swarm import Swarm
 
 QUICK = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0, "swarm.num_vehicles": 8}
@@ -200,80 +198,6 @@ def test_a_browser_reads_the_recording(tmp_path):
         assert ("detected_index" in arrays) == bool(inspected)
 
 
-def saved(folder, policies=("idle", "random"), scenario=None):
-    scenario = scenario or quick("lossy", **{"losses.times_s": [2.0]})
-    results = Results(folder, [scenario])
-    runner.run_missing(results, [scenario], policies, [0, 1], lambda *a: None)
-    return results
-
-
-def test_a_saved_trace_is_shown_as_far_as_it_goes(tmp_path):
-    results = saved(tmp_path)
-    recording = from_trace(results.trace_path("lossy", "random", 0))
-    whole = record(results.scenarios["lossy"], "random", 0)
-    assert recording.metrics == whole.metrics
-    assert recording.scenario == whole.scenario
-    at = np.searchsorted(whole.time_s, recording.time_s)
-    for name in ("time_s", "position", "heading", "references"):
-        np.testing.assert_array_equal(getattr(recording, name), getattr(whole, name)[at])
-    np.testing.assert_allclose(recording.speed, whole.speed[at], rtol=1e-5, atol=1e-6)
-    assert recording.force is None
-    assert recording.spacing is None
-    for name in ("min_spacing_m", "obstacle_clearance_m"):
-        since = [whole.series[name][first:end].min() for first, end in zip([0, *at[:-1] + 1], at + 1, strict=True)]
-        np.testing.assert_array_equal(recording.series[name], since)
-    lost = [event.vehicles for event in whole.events if event.kind == "lost"]
-    assert [event.vehicles for event in recording.events if event.kind == "lost"] == lost
-    shown = from_folder(tmp_path, None, "random", 0)
-    np.testing.assert_array_equal(shown.position, recording.position)
-    json.dumps(payload([recording]), allow_nan=False)
-
-
-def edited(path, change):
-    arrays = dict(np.load(path))
-    change(arrays)
-    np.savez_compressed(path, **arrays)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda a: a.pop("route_position"), "route_position is missing; run the benchmark again"),
-        (lambda a: a.update(route_heading=a["route_heading"][:, :3]), r"route_heading is float32 of shape \(\d+, 3\)"),
-        (lambda a: a.update(waypoints=a["waypoints"].astype(str)), "waypoints is <U32 of shape"),
-        (lambda a: a.update(time_s=a["time_s"][:-1]), "min_spacing_m is float32 of shape"),
-        (lambda a: a.update(route_time_s=a["route_time_s"] + 0.03), "must be times of time_s"),
-    ],
-)
-def test_a_trace_that_lacks_something_is_refused(tmp_path, change, message):
-    path = saved(tmp_path, ["idle"]).trace_path("lossy", "idle", 0)
-    edited(path, change)
-    with pytest.raises(ReplayError, match=message):
-        from_trace(path)
-
-
-def test_what_is_no_trace_is_explained(tmp_path):
-    path = saved(tmp_path / "out").trace_path("lossy", "random", 0)
-    foreign, stray = tmp_path / "traces" / path.name, path.with_name("lossy.random.7.npz")
-    foreign.parent.mkdir()
-    for copy in (foreign, stray):
-        copy.write_bytes(path.read_bytes())
-    for trace, message in (
-        (tmp_path / "nothing.npz", "does not exist; give the folder of a benchmark"),
-        (foreign, "holds no results.json .* simulate with --scenario and --policy"),
-        (stray, "is not the trace of a run in .*results.json"),
-        (path.with_name("lossy.random.1.npz"), "no trajectories: .* seed 0.*: uuv-marl .*--policy random --seed 1"),
-    ):
-        with pytest.raises(ReplayError, match=message):
-            from_trace(trace)
-    for policy, seed, message in (("random", 9, "with seed 9, only 0, 1;"), ("sff", 0, "no 'sff' but idle, random;")):
-        with pytest.raises(ReplayError, match=message):
-            from_folder(tmp_path / "out", "lossy", policy, seed)
-    path.write_bytes(path.read_bytes()[:300])
-    with pytest.raises(ResultsError, match="can't be read .*; delete it and run the benchmark's command again"):
-        from_trace(path)
-
-
 @pytest.fixture
 def written(monkeypatch):
     """What the command gave to the writers of pages and films."""
@@ -305,21 +229,39 @@ def test_the_command_shows_policies_side_by_side(tmp_path, monkeypatch, written)
     assert [(recording.policy, recording.seed) for recording in recordings] == [("idle", 3), ("sdc", 3)]
     assert [list(recording.inspections) for recording in recordings] == [[2], [2]]
     assert recordings[1].scenario.sonar.channels == ("compass", "link")
-    assert path == Path("results/replay/single_obstacle.idle-sdc.3.html")
+    assert re.fullmatch(r"single_obstacle\.idle-sdc\.3\.[0-9a-f]{8}\.html", path.name)
+    assert path.parent == Path("results/replay")
     assert f"Replay: {path}" in text
 
 
-def test_the_command_shows_what_a_benchmark_saved(tmp_path, monkeypatch, written):
+def test_the_command_shows_the_runs_of_a_benchmark(tmp_path, monkeypatch, written):
     monkeypatch.chdir(tmp_path)
-    results = saved(tmp_path / "out")
-    trace = results.trace_path("lossy", "random", 0)
-    for arguments in ([trace], [tmp_path / "out", "--policy=random"], ["out", "--policy=random", "--scenario=lossy"]):
-        code, text = replay(*arguments, "--output=below/x.GIF")
+    scenario = quick("lossy", **{"losses.times_s": [2.0]})
+    results = Results("out", [scenario])
+    runner.run_missing(results, [scenario], ["idle", "random"], [0, 1], lambda *a: None)
+    for arguments in ([], ["--scenario=lossy", "--seed=1", "--inspect=0"]):
+        code, text = replay("out", "--policy=random", "--policy=idle", "--output=below/x.GIF", *arguments)
         assert code == 0, text
-        assert written[-1][0][0].policy == "random"
-        assert written[-1][1] == Path("below/x.GIF")
-    assert replay("out", "--policy=random", "--policy=idle")[0] == 0
-    assert [recording.policy for recording in written[-1][0]] == ["random", "idle"]
+        recordings, path, _ = written[-1]
+        assert path == Path("below/x.GIF")
+        assert [one.metrics for one in recordings] == [
+            row.metrics for name in ("random", "idle") for row in results.select("lossy", name, [recordings[0].seed])
+        ]
+    assert recordings[0].seed == 1
+    assert replay("out")[0] == 0
+    assert [one.policy for one in written[-1][0]] == ["idle", "random"]
+    assert "holds no 'starter' but lossy; choose with --scenario" in replay("out", "--scenario=starter")[1]
+
+
+def test_a_page_s_name_tells_changes_apart(tmp_path, monkeypatch, written):
+    monkeypatch.chdir(tmp_path)
+    Path("own.py").write_text("from uuv_marl.baselines.random_idle import Random\n\n\nclass Mine(Random):\n    pass\n")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    for changes in (SETS, [*SETS, "--set=timing.decision_period_s=0.5"]):
+        assert replay("--policy=own:Mine", *changes)[0] == 0
+    names = [path.name for _, path, _ in written]
+    assert len(set(names)) == 2
+    assert all(re.fullmatch(r"single_obstacle\.own_Mine\.0\.[0-9a-f]{8}\.html", name) for name in names)
 
 
 @pytest.mark.parametrize(
@@ -332,7 +274,7 @@ def test_the_command_shows_what_a_benchmark_saved(tmp_path, monkeypatch, written
         (["--inspect=1", "--inspect=2", "--output=x.mp4"], "a film shows the sonar of one vehicle, got 2"),
         ([f"--policy={name}" for name in ("idle", "random", "sff", "sdc", "mappo")], "at most 4 policies"),
         (["--set=sonar.channels=[]"], "every policy has its own"),
-        (["nowhere"], "nowhere holds no results.json"),
+        (["nowhere"], "nowhere/results.json can't be read (No such file or directory); give the folder of a benchmark"),
     ],
 )
 def test_mistakes_are_explained_before_anything_is_simulated(arguments, message, tmp_path, monkeypatch, written):

@@ -18,7 +18,8 @@ from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.cli import app
 from uuv_marl.replay import demo
 from uuv_marl.replay.encode import CODINGS, payload
-from uuv_marl.replay.page import page_html, write_page
+from uuv_marl.replay.html import html_of
+from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
 
 pytestmark = pytest.mark.docs
@@ -138,11 +139,11 @@ def test_inlined_scripts_are_one_valid_module(page, tmp_path):
 
 def test_a_name_stays_text(recordings):
     name = "</script><b>&{{style}}"
-    text = page_html([recordings[0]._replace(policy=name)])
-    assert text.count("</script>") == page_html(recordings[:1]).count("</script>")
+    text = html_of(payload([recordings[0]._replace(policy=name)]))
+    assert text.count("</script>") == html_of(payload(recordings[:1])).count("</script>")
     assert html.escape(name) in text
-    payload = re.findall(r'id="episodes">(.*?)</script>', text, flags=re.S)[0]
-    assert json.loads(payload)["episodes"][0]["policy"] == name
+    episodes = re.findall(r'id="episodes">(.*?)</script>', text, flags=re.S)[0]
+    assert json.loads(episodes)["episodes"][0]["policy"] == name
 
 
 VIEWS = [(1280, 800, "dark"), (390, 844, "light")]

@@ -9,8 +9,6 @@ from typing_extensions import TypeAliasType
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
-from uuv_marl.percept import CHANNELS
-from uuv_marl.scenario.hardware import CHANNEL_NAMES
 from uuv_marl.sim import entry_points
 from uuv_marl.sim.arrays import Facts, Senses, State, WorldMap
 from uuv_marl.sim.swarm import Swarm
@@ -66,10 +64,6 @@ def test_a_table_documents_shapes_types_and_meaning():
     assert "eta: Pose: north [m], east [m], heading [rad]. Shape (world, vehicle, 3), float64." in State.__doc__
     for table in (State, WorldMap, Senses, Facts):
         assert all(f"\n        {name}: " in table.__doc__ for name in table._fields)
-
-
-def test_a_scenario_accepts_the_channels_that_add_fields():
-    assert CHANNELS == CHANNEL_NAMES
 
 
 @pytest.mark.parametrize(

@@ -237,7 +237,7 @@ def test_interfaces_agree_and_the_global_state_has_the_velocity():
             r"traffic.amplitude_m must be at most .* = 55, so .*, got 55.1; lower it",
         ),
         ("starter", {"amplitude_m": 90.0}, "lies on the trajectory's end; keep 95 m"),
-        ("starter", {"share": 1.5}, "traffic.share must lie within 0 to 1, got 1.5"),
+        ("starter", {"share": 1.5}, "traffic.share must be less than or equal to 1, got 1.5"),
     ],
 )
 def test_errors_name_field_value_and_remedy(name, changes, message):

@@ -357,7 +357,7 @@ def test_a_spec_with_a_scenario_goes_through_json():
     many = gymnasium.make_vec("uuv_marl/Swarm-v1", 2, scenario=scenario, autoreset_mode=mode, max_cycles=three)
     again = gymnasium.make_vec(EnvSpec.from_json(many.spec.to_json()))
     assert (again.scenario, again.metadata["autoreset_mode"]) == (scenario, mode)
-    with pytest.raises(ScenarioError, match="swarm.num_vehicles must be a whole number, got 'x'"):
+    with pytest.raises(ScenarioError, match="swarm.num_vehicles must be a valid integer, got 'x'"):
         uuv_marl.load_scenario({**scenario.model_dump(), "swarm": {"num_vehicles": "x"}})
 
 

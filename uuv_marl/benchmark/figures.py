@@ -85,21 +85,16 @@ def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
     figure, axes = _grid(len(policies), (3.4, 3.6))
     hull_m = results.scenarios[scenario].collision.hull_radius_m
     traces = [results.trace(scenario, policy, 0) for policy in policies]
-    longest = max(float(trace["route_time_s"][-1]) for trace in traces)
-    swarm, lines = Swarm(results.scenarios[scenario]), None
+    swarm = Swarm(results.scenarios[scenario])
     swarm.reset(0)
     groups = groups_of(swarm)
-    colours = _TEAMS[: int(groups.team.max()) + 1] if groups.team.any() else (BLACK,)
+    colours = _TEAMS[: int(groups.team.max()) + 1]
     for ax, policy, trace in zip(axes, policies, traces, strict=False):
         every = max(1, round(_ROUTE_S / float(np.diff(trace["route_time_s"][:2])[0])))
         position = trace["route_position"][::every, :, ::-1]
         legs = np.stack([position[:-1], position[1:]], axis=2)
-        lines = LineCollection(legs.reshape(-1, 2, 2).tolist(), cmap="viridis", linewidths=0.5)
-        if len(colours) > 1:
-            lines.set(color=[colours[k] for k in groups.team] * len(legs))
-        else:
-            lines.set_array(np.repeat(trace["route_time_s"][::every][:-1], legs.shape[1]))
-            lines.set_clim(0.0, longest)
+        lines = LineCollection(legs.reshape(-1, 2, 2).tolist(), linewidths=0.5)
+        lines.set(color=[colours[k] for k in groups.team] * len(legs))
         if not groups.informed.all():
             lines.set_linewidth(np.where(groups.informed, 1.5, 0.5).tolist() * len(legs))
             ax.plot([], [], color=BLACK, linewidth=1.5, label="thick: observes l(t)")
@@ -117,9 +112,6 @@ def _routes(results: Results, scenario: str, policies: Sequence[str]) -> Figure:
     figure.supxlabel("east [m]")
     figure.supylabel("north [m]")
     figure.suptitle(f"Trajectories of each policy: {_where(results.scenarios[scenario], 'seed 0')}")
-    if lines is not None and len(colours) == 1:
-        bar = axes[-1].inset_axes((0.1, 0.12, 0.8, 0.05))
-        figure.colorbar(lines, cax=bar, orientation="horizontal", label="colour of trajectories: time [s]")
     named = dict(zip(*axes[0].get_legend_handles_labels()[::-1], strict=True))
     axes[-1].legend(named.values(), named.keys(), loc="upper center", fontsize=9)
     return figure

@@ -3,12 +3,11 @@
 Actuator lags are included. The integration step is the longest that the vehicle accepts.
 """
 
-import json
 import math
 from collections.abc import Iterator
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.scenario import Scenario, load_scenario, load_vehicle, variant_names, vehicle_names
+from uuv_marl.scenario import Scenario, load_scenario, variant_names, vehicle_names
 from uuv_marl.sim.disturbances.actuation import actuation, followed
 from uuv_marl.sim.vehicle import STILL, State6, actuators, advance_lagging, plant
 
@@ -33,9 +32,9 @@ def alone(vehicle: str, **overrides: object) -> Scenario:
         try:
             return load_scenario("tracking", num_vehicles=1, overrides=slow | {"timing.integration_step_s": step_s})
         except ScenarioError as error:
-            if "timing.integration_step_s" not in str(error) or step_s == STEPS_S[-1]:
+            if "timing.integration_step_s" not in str(error):
                 raise
-    raise AssertionError("the last step is returned or raises")
+    raise ScenarioError(f"vehicle {vehicle} needs a shorter step than {STEPS_S[-1]} s")
 
 
 def swim(scenario: Scenario, action: tuple[float, float], seconds: float, speed_mps: float = 0.0) -> Iterator[State6]:
@@ -59,14 +58,10 @@ def swim(scenario: Scenario, action: tuple[float, float], seconds: float, speed_
         yield now
 
 
-def _turn(scenario: Scenario) -> tuple[float, float]:
-    """The action of the tightest turn."""
-    return (1.0, 1.0) if scenario.actuators.kind == "rudder" else (0.0, 1.0)
-
-
 def turn(scenario: Scenario) -> tuple[float, float, float]:
     """Top speed [m/s], and rate [deg/s] and radius [m] of the tightest turn."""
-    top, turning = last(scenario, (1.0, 0.0), SETTLE_S), last(scenario, _turn(scenario), SETTLE_S)
+    tightest = (1.0, 1.0) if scenario.actuators.kind == "rudder" else (0.0, 1.0)
+    top, turning = last(scenario, (1.0, 0.0), SETTLE_S), last(scenario, tightest, SETTLE_S)
     return top[3], math.degrees(turning[5]), math.hypot(turning[3], turning[4]) / abs(turning[5])
 
 
@@ -79,14 +74,3 @@ def last(scenario: Scenario, action: tuple[float, float], seconds: float) -> Sta
 def every() -> list[str]:
     """All vehicles of the catalogue, each followed by its variants."""
     return [name for one in vehicle_names() for name in (one, *(f"{one}+{variant}" for variant in variant_names(one)))]
-
-
-def changes(vehicle: str) -> list[str]:
-    """``field = value`` of the fields that the variants in a vehicle's name change."""
-    plain, now = load_vehicle(vehicle.partition("+")[0]), load_vehicle(vehicle)
-    return [
-        f"{field} = {value if isinstance(value, str) else json.dumps(value)}"
-        for section, fields in now.items()
-        for field, value in fields.items()
-        if value != plain[section][field] and field != "name"
-    ]

@@ -1,6 +1,6 @@
 """Definitions of the metrics. Distances are taken from the start to the end of an episode."""
 
-from typing import NamedTuple, NotRequired
+from typing import NotRequired
 
 import numpy as np
 
@@ -19,50 +19,29 @@ class Metrics(Measures, Success):
     """The task's own measures (``uuv_marl.tasks.Task.metrics``); absent in ``follow``, whose own are the others."""
 
 
-class Sample(NamedTuple):
-    """Measures of one step, shape (world,) each, lengths in m."""
-
-    time_s: Float64
-    min_spacing_m: Float64
-    """Smallest distance between two vehicles."""
-    max_spacing_m: Float64
-    """Largest distance between two vehicles."""
-    centre_error_m: Float64
-    """Distance of the swarm's centre from l(t), the mean of the groups'."""
-    order_parameter: Float64
-    """Length of the mean heading vector: 1 aligned, 0 disordered."""
-    within_s_l: Float64
-    """1 where every vehicle is within s_l of l(t). Eq. 7."""
-    within_s_o: Float64
-    """1 where every vehicle keeps s_o from every obstacle's surface. Eq. 7."""
-    within_s_u: Float64
-    """1 where all vehicles keep s_u from each other. Eq. 7."""
-    effort: Float64
-    """Mean squared action of the vehicles that are not lost, as a share of full force."""
-    saturation: Float64
-    """Share of actions at the actuators' limit."""
-
-
-def measure(swarm: Swarm) -> Sample:
-    """The sample of a swarm in its current state."""
+def measure(swarm: Swarm) -> dict[str, Float64]:
+    """Measures of a swarm in its current state, shape (world,) each; docs/benchmark.md defines them."""
     facts, state, constraints = swarm.facts, swarm.state, swarm.scenario.constraints
     alive = state.alive
     living = np.maximum(alive.sum(axis=1), 1)
     psi = state.eta[:, :, 2]
     order = np.hypot((np.cos(psi) * alive).sum(axis=1), (np.sin(psi) * alive).sum(axis=1)) / living
     any_alive = alive.any(axis=1)
-    return Sample(
-        time_s=facts.time_s.copy(),
-        min_spacing_m=facts.min_spacing.copy(),
-        max_spacing_m=facts.max_spacing.copy(),
-        centre_error_m=np.hypot(*(facts.centre - swarm.mean_reference[:, :2]).T),
-        order_parameter=np.where(any_alive, order, np.nan),
-        within_s_l=(any_alive & (np.where(alive, facts.away, 0.0).max(axis=1) <= constraints.s_l_m)).astype(np.float64),
-        within_s_o=(any_alive & (facts.obstacle_clearance.min(axis=1) >= constraints.s_o_m)).astype(np.float64),
-        within_s_u=(any_alive & (facts.min_spacing >= constraints.s_u_m)).astype(np.float64),
-        effort=(facts.effort * alive).sum(axis=1) / living,
-        saturation=facts.saturated.copy(),
-    )
+    within = {
+        "within_s_l": np.where(alive, facts.away, 0.0).max(axis=1) <= constraints.s_l_m,
+        "within_s_o": facts.obstacle_clearance.min(axis=1) >= constraints.s_o_m,
+        "within_s_u": facts.min_spacing >= constraints.s_u_m,
+    }
+    return {
+        "time_s": facts.time_s.copy(),
+        "min_spacing_m": facts.min_spacing.copy(),
+        "max_spacing_m": facts.max_spacing.copy(),
+        "centre_error_m": np.hypot(*(facts.centre - swarm.mean_reference[:, :2]).T),
+        "order_parameter": np.where(any_alive, order, np.nan),
+        **{name: (any_alive & holds).astype(np.float64) for name, holds in within.items()},
+        "effort": (facts.effort * alive).sum(axis=1) / living,
+        "saturation": facts.saturated.copy(),
+    }
 
 
 class MetricsRecorder:
@@ -70,7 +49,7 @@ class MetricsRecorder:
 
     def __init__(self, swarm: Swarm) -> None:
         self._swarm = swarm
-        self._samples: list[Sample] = []
+        self._samples: list[dict[str, Float64]] = []
         self._clearances: list[Float64] = []
         self._collisions = np.zeros(swarm.num_worlds, np.int64)
         self._success = SuccessRecorder(swarm) if isinstance(swarm.task, Follow) else None
@@ -84,7 +63,7 @@ class MetricsRecorder:
             self._success.update(active)
 
     def series(self, world: int) -> dict[str, Float32]:
-        """A world's samples over time: every field of ``Sample``, and ``obstacle_distance_m`` (time, obstacle)."""
+        """A world's samples over time: those of ``measure``, and ``obstacle_distance_m`` (time, obstacle)."""
         columns = {name: values.astype(np.float32) for name, values in self._table(world).items()}
         num = int(self._swarm.world_map.num_obstacles[world])
         distances = np.array([clearance[world, :num] for clearance in self._clearances], np.float32)
@@ -133,7 +112,7 @@ class MetricsRecorder:
 
     def _table(self, world: int) -> dict[str, Float64]:
         """A world's samples over time, shape (time,) each."""
-        return {name: np.array([getattr(s, name)[world] for s in self._samples]) for name in Sample._fields}
+        return {name: np.array([sample[name][world] for sample in self._samples]) for name in self._samples[0]}
 
 
 def _own(task: Task, world: int) -> dict[str, float | None]:

@@ -1,19 +1,17 @@
 """Results on disk: every seed and metric, written after each run, so that a stopped benchmark can be resumed."""
 
-import functools
 import hashlib
 import inspect
 import json
 import os
 import platform
-import uuid
+import re
 import zipfile
 import zlib
 from collections.abc import Container, Iterable
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, NotRequired
-from urllib.parse import quote
 
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
@@ -42,8 +40,7 @@ _SOURCES = (
     "benchmark/**/*.py",
 )  # fmt: skip
 _LIBRARIES = ("numpy", "numba", "scipy", "gymnasium", "pettingzoo")
-_LONGEST_NAME = 200
-"""Longest name of a run [bytes]; file systems allow 255."""
+_LONGEST_NAME = 200  # file systems allow 255 bytes
 
 
 class ResultRow(NamedTuple):
@@ -139,15 +136,12 @@ class Results:
 
     def _continue(self, content: Content) -> None:
         elsewhere = "move it away or give another --output"
-        if content["fingerprint"] != self._fingerprint:
-            raise ResultsError(
-                f"{self._path} comes from other code of uuv_marl; {elsewhere}, so that no table mixes the two"
-            )
-        for library, this_version in self._versions.items():
-            if (saved_version := content["versions"].get(library, this_version)) != this_version:
+        saved = content["versions"] | {"code": content["fingerprint"]}
+        for what, here in (self._versions | {"code": self._fingerprint}).items():
+            if saved.get(what, here) != here:
                 raise ResultsError(
-                    f"{self._path} comes from {library} {saved_version}, and here is {this_version}; {elsewhere}, so "
-                    "that no table mixes the two"
+                    f"{self._path} comes from {what} {saved[what]}, and here is {here}; {elsewhere}, so that no table "
+                    "mixes the two"
                 )
         for name, dump in self._dumps.items():
             if content["scenarios"].get(name, dump) != dump:
@@ -228,19 +222,17 @@ class Results:
 
 def trace_path(folder: Path, scenario: str, policy: str, seed: int) -> Path:
     """Path of a run's time series."""
-    return folder / "traces" / f"{run_name(scenario, policy, seed)}.npz"
+    return folder / "traces" / f"{file_name(f'{scenario}.{policy}.{seed}')}.npz"
 
 
-def run_name(scenario: str, policy: str, seed: int) -> str:
-    """File name of a run without a suffix; a long name ends in a hash."""
-    name = f"{scenario}.{quote(policy, safe='')}.{seed}"
-    if len(name.encode()) > _LONGEST_NAME:
-        name = f"{name.encode()[: _LONGEST_NAME - 17].decode(errors='ignore')}-{_hash(name.encode())}"
-    return name
+def file_name(name: str, changes: object = ()) -> str:
+    """A name for a file: a short one with plain characters alone, and a hash of what this or ``changes`` hides."""
+    words = re.sub(r"[^\w.,=+-]", "_", name, flags=re.ASCII)[:_LONGEST_NAME]
+    return words if words == name and not changes else f"{words}.{_hash(repr((name, changes)).encode())[:8]}"
 
 
 def load_trace(path: UserPath) -> Trace:
-    """A run's time series: the fields of ``metrics.Sample`` and ``obstacle_distance_m``.
+    """A run's time series: those of ``metrics.measure`` and ``obstacle_distance_m``.
 
     Also ``obstacles`` and ``waypoints``, and where trajectories are kept the fields of ``evaluate.Routes`` as
     ``route_time_s`` and so on; docs/benchmark.md has shapes and units.
@@ -263,8 +255,7 @@ def policy_info(policy: str) -> PolicyInfo:
     if isinstance(policy_type, Trained):
         source = policy_type.checkpoint.digest
     else:
-        file = inspect.getsourcefile(policy_type)
-        source = (_hash(Path(file).read_bytes()) if file else _unknown()) if ":" in policy else None
+        source = _file_hash(policy_type) if ":" in policy else None
     required = policy_requirements(policy)
     damping = required.yaw_damping_nms * (FULL_TORQUE_NM / required.full_torque_nm)
     known = PolicyInfo(channels=list(required.channels), yaw_damping_nms=damping, source=source)
@@ -284,28 +275,23 @@ def requirements_of(known: PolicyInfo) -> PolicyRequirements:
 def source_fingerprint() -> str:
     """Hash of everything that determines a run: code of the layers up to the benchmark's, and tuned gains."""
     code = sorted({path for pattern in _SOURCES for path in _PACKAGE.glob(pattern)})
-    if Path(__file__).resolve() not in code:
-        return _unknown()
     return _hash(
         b"".join(f"{path.relative_to(_PACKAGE).as_posix()}\0".encode() + path.read_bytes() + b"\0" for path in code)
     )
-
-
-@functools.cache
-def _unknown() -> str:
-    """A stand-in for a hash without source on disk, different in each process, so that no results are mixed."""
-    return f"unknown {uuid.uuid4().hex[:16]}"
 
 
 def _hash(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:16]
 
 
+def _file_hash(kind: type) -> str:
+    """Hash of the file that defines a class."""
+    return _hash(Path(inspect.getfile(kind)).read_bytes())
+
+
 def _tasks(scenarios: Iterable[Scenario]) -> dict[str, str]:
     """Hash of the file of each user-defined task, by its name."""
-    named = {scenario.task.name: scenario.task_class for scenario in scenarios if ":" in scenario.task.name}
-    files = {name: inspect.getsourcefile(task) for name, task in named.items()}
-    return {name: _hash(Path(file).read_bytes()) if file else _unknown() for name, file in files.items()}
+    return {each.task.name: _file_hash(each.task_class) for each in scenarios if ":" in each.task.name}
 
 
 def _versions() -> dict[str, str]:

@@ -98,8 +98,11 @@ def write_report(
     policies = [name for name in dict.fromkeys([*DEFAULT_POLICIES, *held]) if name in held]
     tables = [scenario_table(results, scenario, policies, seeds) for scenario in scenarios]
     path = results.folder / "table.md"
-    texts = [f"## {table.title}\n\n{markdown_table(table.headers, table.rows)}" for table in tables]
-    captions = dict.fromkeys(table.caption for table in tables)
+    texts = [
+        f"## {table.title}\n\n{markdown_table([*table.rows[0]], [[*row.values()] for row in table.rows])}"
+        for table in tables
+    ]
+    captions = dict.fromkeys(table.caption() for table in tables)
     write_text(path, "\n".join([*texts, *(f"{caption}\n" for caption in captions)]))
     with writing(results.folder / "figures"):
         return tables, [path, *(figure for s in scenarios for figure in draw_all(results, s.name, policies, seeds))]

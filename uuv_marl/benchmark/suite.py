@@ -1,6 +1,5 @@
 """Suites: cases whose missing runs are run and kept in a folder, so that a stopped job can be resumed."""
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -9,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.benchmark.results import Results, Trace
+from uuv_marl.benchmark.results import Results, Trace, file_name
 from uuv_marl.benchmark.runner import run_missing
 from uuv_marl.scenario import Scenario, load_scenario
 
@@ -43,11 +42,8 @@ class Case(NamedTuple):
     @property
     def folder(self) -> str:
         """Folder name; unless shared, with a hash of the case, so that a changed case never finds old runs."""
-        if self.shared:
-            return self.name
-        changed = hashlib.sha256(repr((self.load(), self.policy, sorted(self.parameters.items()))).encode())
-        words = "".join(c if c.isalnum() or c in ".-" else "_" for c in self.name)
-        return f"{words}.{changed.hexdigest()[:8]}"
+        case = (self.load(), self.policy, sorted(self.parameters.items()))
+        return self.name if self.shared else file_name(self.name, case)
 
 
 class Suite:

@@ -1,6 +1,6 @@
 """The benchmark's tables: interquartile means over seeds with intervals, worst seeds, and the paper's figures."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,70 +18,46 @@ from uuv_marl.tasks import Follow
 NOTHING = "–"
 """Cell without a value."""
 _NARROW = 110
-"""Columns of a terminal below which its table omits intervals and the time mean."""
-HEADERS = (
-    "policy", "class, and extra observations", "arrived", "task time [s]", "worst", "obstacle distance [m]", "worst",
-    "spacing [m]", "worst", "mean spacing [m]", "within Eq. 7", "collisions", "paper",
-)  # fmt: skip
-CAPTION = (
-    "Interquartile mean over seeds [95 % bootstrap interval]; worst seed; times over the seeds that arrived. "
-    "Arrived is the paper's success: all vehicles rest at the end, or have passed it where arrival.criterion = "
-    "passage, with or without collisions. "
-    "Obstacle distance: smallest, to the surface; spacing: smallest between two vehicles, and its time mean. "
-    "Within Eq. 7: mean share of the time in which all vehicles are within s_l of l(t), keep s_o from obstacles, "
-    "and s_u from each other. "
-    "SFF and SDC are reconstructions: the paper only names them. Figures of the paper are single runs."
-)
-_TASK_CAPTION = (
-    "Interquartile mean over seeds [95 % bootstrap interval]; worst seed. Swarm success: episodes in which every "
-    "vehicle succeeds; a vehicle succeeds if it is at its goal at the end of the episode and has had no collision. "
-    "Success: mean share of such vehicles. Obstacle distance: smallest, to the surface; spacing: smallest between two "
-    "vehicles."
-)
-
-
-class RowCells(NamedTuple):
-    """A policy's row of the table of ``follow``, a text for each of ``HEADERS``."""
-
-    policy: str
-    requirements: str
-    arrived: str
-    time: str
-    slowest: str
-    distance: str
-    nearest: str
-    spacing: str
-    closest: str
-    mean: str
-    within: str
-    collisions: str
-    paper: str
+"""Columns of a terminal below which its table has no space beside its lines."""
+_NEEDS = "class, and extra observations"
+_WIDE = (_NEEDS, "worst time [s]", "mean spacing [m]", "within Eq. 7")
+"""Columns that a terminal's table omits, as it omits intervals; the first is below the policy's name."""
+_INTERVAL = " [95 % bootstrap interval]"
+_MEANINGS = {
+    "policy": f"Interquartile mean over seeds{_INTERVAL}; worst seed; times over the seeds that arrived.",
+    "arrived": "Arrived is the paper's success: all vehicles rest at the end, or have passed it where "
+    "arrival.criterion = passage, with or without collisions.",
+    "swarm success": "Swarm success: episodes in which every vehicle succeeds; a vehicle succeeds if it is at its goal "
+    "at the end of the episode and has had no collision.",
+    "success": "Success: mean share of such vehicles.",
+    "obstacle distance [m]": "Obstacle distance: smallest, to the surface; spacing: smallest between two vehicles.",
+    "mean spacing [m]": "Mean spacing: time mean of the smallest.",
+    "within Eq. 7": "Within Eq. 7: mean share of the time in which all vehicles are within s_l of l(t), keep s_o from "
+    "obstacles, and s_u from each other.",
+    "paper": "SFF and SDC are reconstructions: the paper only names them. Figures of the paper are single runs.",
+}
+"""Sentences of the caption, by the column that they belong to."""
 
 
 class Table(NamedTuple):
     """A scenario's table."""
 
     title: str
-    headers: tuple[str, ...]
-    """``HEADERS`` for the task ``follow``, whose rows are ``RowCells``."""
-    rows: Sequence[tuple[str, ...]]
-    caption: str
+    rows: Sequence[Mapping[str, str]]
+    """At least one; cells by the header of their column."""
+    meanings: Mapping[str, str] = _MEANINGS
+
+    def caption(self, *omitted: str) -> str:
+        """The meaning of the columns but the omitted ones."""
+        return " ".join(self.meanings[name] for name in self.rows[0] if name in self.meanings and name not in omitted)
 
 
 def scenario_table(results: Results, scenario: Scenario, policies: Sequence[str], seeds: Sequence[int]) -> Table:
     """The table of a scenario, with a row for each of the policies that has runs with these seeds."""
     runs = {policy: results.select(scenario.name, policy, seeds) for policy in policies}
-    loaded, task = results.scenarios[scenario.name], scenario.task_class
-    rows = [_cells(loaded, own, results.policies[policy]) for policy, own in runs.items() if own]
-    if issubclass(task, Follow):
-        return Table(title(scenario, seeds), HEADERS, rows, CAPTION)
-    headers = (
-        "policy", "class, and extra observations", "swarm success", "success", *task.columns,
-        "obstacle distance [m]", "worst", "spacing [m]", "worst", "collisions",
-    )  # fmt: skip
-    task_rows = [_task_cells(cells, runs[cells.policy], task.columns) for cells in rows]
-    own_columns = "".join(f" {name}: {meaning}." for name, meaning in task.columns.items())
-    return Table(title(scenario, seeds), headers, task_rows, _TASK_CAPTION + own_columns)
+    loaded, own = results.scenarios[scenario.name], scenario.task_class.columns
+    rows = [_row(loaded, each, results.policies[policy]) for policy, each in runs.items() if each]
+    return Table(title(scenario, seeds), rows, _MEANINGS | {name: f"{name}: {own[name]}." for name in own})
 
 
 def title(scenario: Scenario, seeds: Sequence[int]) -> str:
@@ -94,47 +70,48 @@ def title(scenario: Scenario, seeds: Sequence[int]) -> str:
     )
 
 
-def _cells(scenario: Scenario, runs: Sequence[ResultRow], info: PolicyInfo) -> RowCells:
+def _row(scenario: Scenario, runs: Sequence[ResultRow], info: PolicyInfo) -> dict[str, str]:
     """The row of a policy from its runs, at least one."""
-    policy = runs[0].policy
-    times, distances, spacings = (
-        _measured(runs, name) for name in ("task_time_s", "min_obstacle_distance_m", "min_spacing_m")
-    )
-    collisions = [run.metrics["collisions"] for run in runs]
-    collided = sum(count > 0 for count in collisions)
-    shares = [run.metrics["constraint_share"] for run in runs]
-    return RowCells(
-        policy=policy,
-        requirements=_requirements_text(scenario, policy, info),
-        arrived=f"{len(times)}/{len(runs)}",
-        time=estimate_text(times, ".1f"),
-        slowest=f"{max(times):.1f}" if times else NOTHING,
-        distance=estimate_text(distances, ".2f"),
-        nearest=f"{min(distances):.2f}" if distances else NOTHING,
-        spacing=estimate_text(spacings, ".2f"),
-        closest=f"{min(spacings):.2f}" if spacings else NOTHING,
-        mean=estimate_text(_measured(runs, "mean_min_spacing_m"), ".2f"),
-        within=", ".join(f"{name} {np.mean([s[name] for s in shares]):.0%}" for name in ("s_l", "s_o", "s_u")),
-        collisions=f"{sum(collisions)} in {counted(collided, 'seed')}" if collided else "0",
-        paper=NOTHING if differences(scenario) else _paper_cell(PAPER.get((scenario.name, policy), PaperFigure())),
-    )
-
-
-def _task_cells(cells: RowCells, runs: Sequence[ResultRow], columns: Iterable[str]) -> tuple[str, ...]:
-    """The row of a policy in the table of a task with measures of its own."""
-    shares = _measured(runs, "success_share")
-    return (
-        cells.policy, cells.requirements, f"{_measured(runs, 'swarm_success').count(1.0)}/{len(runs)}",
-        f"{np.mean(shares):.1%}" if shares else NOTHING,
-        *(estimate_text(_measured(runs, name), ".3g") for name in columns),
-        cells.distance, cells.nearest, cells.spacing, cells.closest, cells.collisions,
-    )  # fmt: skip
-
-
-def _measured(runs: Sequence[ResultRow], name: str) -> list[float]:
-    """A metric, also one of the task's own, of the runs that have it."""
+    policy, task = runs[0].policy, scenario.task_class
     every: list[Mapping[str, Any]] = [{**run.metrics, **run.metrics.get("task", {})} for run in runs]
-    return [value for metrics in every if (value := metrics.get(name)) is not None]
+
+    def values(metric: str) -> list[float]:
+        return [metrics[metric] for metrics in every if metrics.get(metric) is not None]
+
+    def worst(metric: str, spec: str, pick: Callable[[list[float]], float] = min) -> str:
+        return f"{pick(values(metric)):{spec}}" if values(metric) else NOTHING
+
+    def mean(metric: str, spec: str) -> str:
+        return estimate_text(values(metric), spec)
+
+    counts = values("collisions")
+    collisions = f"{sum(counts)} in {counted(sum(map(bool, counts)), 'seed')}" if any(counts) else "0"
+    shares = [run.metrics["constraint_share"] for run in runs]
+    within = (f"{name} {np.mean([share[name] for share in shares]):.0%}" for name in ("s_l", "s_o", "s_u"))
+    follows, success = issubclass(task, Follow), values("success_share")
+    first = {
+        "arrived": f"{len(values('task_time_s'))}/{len(runs)}",
+        "task time [s]": mean("task_time_s", ".1f"),
+        "worst time [s]": worst("task_time_s", ".1f", max),
+    } if follows else {
+        "swarm success": f"{values('swarm_success').count(1.0)}/{len(runs)}",
+        "success": f"{np.mean(success):.1%}" if success else NOTHING,
+        **{name: mean(name, ".3g") for name in task.columns},
+    }  # fmt: skip
+    figure = PaperFigure() if differences(scenario) else PAPER.get((scenario.name, policy), PaperFigure())
+    paper = {"mean spacing [m]": mean("mean_min_spacing_m", ".2f"), "within Eq. 7": ", ".join(within)}
+    return {
+        "policy": policy,
+        _NEEDS: _requirements_text(scenario, policy, info),
+        **first,
+        "obstacle distance [m]": mean("min_obstacle_distance_m", ".2f"),
+        "worst distance [m]": worst("min_obstacle_distance_m", ".2f"),
+        "spacing [m]": mean("min_spacing_m", ".2f"),
+        "worst spacing [m]": worst("min_spacing_m", ".2f"),
+        **(paper if follows else {}),
+        "collisions": collisions,
+        **({"paper": _paper_cell(figure)} if follows else {}),
+    }
 
 
 def estimate_text(sample: Sequence[float], spec: str) -> str:
@@ -172,40 +149,20 @@ def _paper_cell(paper: PaperFigure) -> str:
 
 def terminal_table(table: Table, width: int) -> RichTable:
     """A table for a terminal of a given width in columns; names of policies are folded last, and never cut."""
-    stacked, narrow = table.headers == HEADERS, width < _NARROW
     out = RichTable(
-        title=table.title, title_justify="left", caption=escape(table.caption), caption_justify="left",
-        padding=0 if narrow else (0, 1), show_lines=stacked,
+        title=table.title, title_justify="left", caption=escape(table.caption(*_WIDE).replace(_INTERVAL, "")),
+        caption_justify="left", padding=0 if width < _NARROW else (0, 1), show_lines=True,
     )  # fmt: skip
-    longest = max((len(row[0]) for row in table.rows), default=0)
-    if stacked:
-        out.add_column("policy", overflow="fold", width=min(max(longest, 0 if narrow else 23), width // 4))
-        for header in ("arrived", "task time [s]", "obstacle distance [m]", "spacing [m]"):
-            out.add_column(escape(header), justify="right", overflow="fold")
-        out.add_column("collisions" if narrow else "within Eq. 7, collisions", overflow="fold")
-        out.add_column("paper", overflow="fold")
-    else:
-        widths = {table.headers[0]: min(longest, width // 4), table.headers[-1]: len(table.headers[-1])}
-        for header in table.headers:
-            out.add_column(escape(header), overflow="fold", width=widths.get(header))
+    shown = [name for name in table.rows[0] if name not in _WIDE]
+    longest = max(22, *(len(row["policy"]) for row in table.rows))
+    for name in shown:
+        out.add_column(escape(name), overflow="fold", width=min(longest, width // 5) if name == "policy" else None)
     for row in table.rows:
-        cells = _stacked(RowCells(*row), narrow) if stacked else row
-        out.add_row(*(escape(cell.replace(NOTHING, "-")) for cell in cells))  # a dash that every terminal has
+        cells = [row[name].partition(" [")[0].replace(NOTHING, "-") for name in shown]  # a dash every terminal has
+        if row[_NEEDS] != NOTHING:
+            cells[0] += f"\n({row[_NEEDS]})"
+        out.add_row(*map(escape, cells))
     return out
-
-
-def _stacked(c: RowCells, narrow: bool) -> tuple[str, ...]:
-    """The cells of a row that fit a terminal; a narrow one omits intervals, the time mean and the shares of Eq. 7."""
-    time, distance, spacing = (text.partition(" [")[0] if narrow else text for text in (c.time, c.distance, c.spacing))
-    return (
-        c.policy if c.requirements == NOTHING else f"{c.policy}\n({c.requirements})",
-        c.arrived,
-        f"{time}\nworst {c.slowest}",
-        f"{distance}\nworst {c.nearest}",
-        f"{spacing}\nworst {c.closest}" + ("" if narrow else f"\ntime mean {c.mean}"),
-        c.collisions if narrow else f"{c.within}\ncollisions: {c.collisions}",
-        c.paper,
-    )
 
 
 def markdown_table(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

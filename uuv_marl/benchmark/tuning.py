@@ -52,13 +52,10 @@ class Range(NamedTuple):
     log: bool = False
 
 
-def _ranges() -> dict[str, dict[str, Range]]:
-    """The tables of ``spaces.toml``."""
-    tables = tomllib.loads(Path(__file__).with_name("spaces.toml").read_text(encoding="utf-8"))
-    return {name: {free: Range(**bounds) for free, bounds in table.items()} for name, table in tables.items()}
-
-
-_RANGES = _ranges()
+_RANGES = {
+    name: {free: Range(**bounds) for free, bounds in table.items()}
+    for name, table in tomllib.loads(Path(__file__).with_name("spaces.toml").read_text(encoding="utf-8")).items()
+}
 
 
 class Space(NamedTuple):

@@ -22,14 +22,6 @@ from uuv_marl.cli.console import (
     working,
 )  # fmt: skip
 
-_WORST = "The worst episode (by collisions, arrival, distance) is seed {worst.seed} of {worst.policy}. To watch it:"
-_NEXT = (
-    'Next: look at the pictures; read the numbers in Python with uuv_marl.benchmark.load("{output}"), which needs the '
-    'extra "analysis".'
-)
-_TRAIN = """Train a policy for this scenario, and compare it with --policy runs/mine/best:
-  uuv-marl train {scenario} --minutes 5 --output runs/mine"""
-
 
 def benchmark(
     scenario: Annotated[
@@ -59,7 +51,7 @@ def benchmark(
     Example: uuv-marl benchmark --scenario tracking --scenario multi_obstacle --policy bio_inspired
     """
     with explained():
-        from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
+        from uuv_marl.baselines import make_policy, with_policy_requirements
         from uuv_marl.benchmark import runner
         from uuv_marl.benchmark.results import Results
         from uuv_marl.benchmark.tables import terminal_table
@@ -90,11 +82,11 @@ def benchmark(
             say(f"  {path}")
         worst = runner.worst(results, scenarios, policies, wanted)
         again = command(files[names.index(worst.scenario)], worst.policy, worst.seed, overrides or [])
-        say(_WORST.format(worst=worst))
+        say(
+            f"The worst episode (by collisions, arrival, distance) is seed {worst.seed} of {worst.policy}. To watch it:"
+        )
         say(f"  {again}")
-        say(_NEXT.format(output=output))
-        if set(policies) <= {*POLICIES} and names == ["starter"] and not overrides:
-            say(_TRAIN.format(scenario=files[0]))
+        say(f'Next: read the numbers in Python with uuv_marl.benchmark.load("{output}"): needs the extra "analysis".')
 
 
 def tune_command(

@@ -1,6 +1,5 @@
 """Shared parts of all commands: consoles, options, the progress bar, and error messages."""
 
-import errno
 import io
 import os
 import sys
@@ -42,7 +41,6 @@ def overrides_option(example: str) -> Any:
     return typer.Option("--set", metavar="FIELD=VALUE", help=f"Override a field, such as `{example}`.")
 
 
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 _PACKAGE = str(Path(__file__).resolve().parent.parent)
 _NOT_THE_USERS = (_PACKAGE, *(sysconfig.get_path(name) for name in ("stdlib", "platlib", "purelib")))
 _MOST_FRAMES = 5
@@ -91,8 +89,6 @@ def explained(*ours: str) -> Iterator[None]:
             message = str(error)
         elif frames:
             message = f"{type(error).__name__}: {error}"
-        elif isinstance(error, OSError) and error.errno in _FULL:
-            message = f"{error.filename or 'a file'} can't be written ({error.strerror}); earlier results are kept"
         else:
             raise
         errors.print(f"[bold red]Error:[/] {escape(message)}", highlight=False, soft_wrap=True)

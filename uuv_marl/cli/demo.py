@@ -1,5 +1,6 @@
 """``uuv-marl demo``: a recording of three policies on one hard map."""
 
+import json
 import sys
 import webbrowser
 from pathlib import Path
@@ -16,9 +17,11 @@ def demo(
     Example: uuv-marl demo --output demo.html
     """
     with explained():
-        from uuv_marl.replay.demo import POLICIES, SCENARIO, SEED, write_demo
+        from uuv_marl.atomic import write_text
+        from uuv_marl.replay.demo import POLICIES, RECORDED, SCENARIO, SEED
+        from uuv_marl.replay.html import html_of
 
-        write_demo(output)
+        write_text(output, html_of(json.loads(RECORDED.read_text(encoding="utf-8"))))
         say(f"Recorded replay, to open in a browser: {output} ({output.stat().st_size / 1000:,.0f} kB)")
         if sys.stdout.isatty():
             webbrowser.open(output.resolve().as_uri())

@@ -5,10 +5,9 @@ from enum import StrEnum
 from typing import Annotated, Any, get_args
 
 import typer
-from rich.syntax import Syntax
 from rich.table import Table
 
-from uuv_marl.cli.console import console, explained, find_modules
+from uuv_marl.cli.console import console, explained, find_modules, say
 
 
 class ListKind(StrEnum):
@@ -25,8 +24,8 @@ def show_list(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Print the file of this scenario or vehicle, such as lauv or remus100+munk_on, with all sources; "
-            "after policies, what this policy does and its parameters.",
+            help="Print the file of this scenario or vehicle, such as lauv, with all sources; after policies, what this "
+            "policy does and its parameters.",
         ),
     ] = None,
 ) -> None:
@@ -38,10 +37,7 @@ def show_list(
     """
     with explained():
         if show is not None:
-            if what is ListKind.POLICIES:
-                console.print(_policy(show), markup=False, highlight=False, soft_wrap=True)
-            else:
-                _print_toml(_file(what, show))
+            say(_policy(show) if what is ListKind.POLICIES else _file(what, show))
             return
         tables = {ListKind.SCENARIOS: _scenarios, ListKind.VEHICLES: _vehicles, ListKind.POLICIES: _policies}
         for kind, table in tables.items():
@@ -84,7 +80,7 @@ def _scenarios() -> Table:
 
 
 def _vehicles() -> Table:
-    from uuv_marl.benchmark.handling import alone, changes, every, turn
+    from uuv_marl.benchmark.handling import alone, every, turn
 
     table = Table("name", "length [m]", "mass [kg]", "top speed [m/s]", "turn", "source")
     for name in every():
@@ -93,7 +89,7 @@ def _vehicles() -> Table:
         top, rate, radius = turn(scenario)
         how = f"{rate:.0f} deg/s" + (f", radius {radius:.1f} m" if radius > 0.01 else " on the spot")
         length = "-" if hull.length_m is None else f"{hull.length_m:g}"
-        source = f"variant: {', '.join(changes(name))}" if "+" in name else hull.source
+        source = f"variant: --show {name.partition('+')[0]}" if "+" in name else hull.source
         table.add_row(name, length, f"{hull.m_kg:g}", f"{top:.2f}", how, source)
     return table
 
@@ -109,12 +105,3 @@ def _policies() -> Table:
         what = (policy_type.__doc__ or "").strip().partition("\n")[0]  # nothing under python -OO
         table.add_row(name, ", ".join(required.channels) or "-", f"{required.yaw_damping_nms:g}", every, what)
     return table
-
-
-def _print_toml(text: str) -> None:
-    console.print(
-        Syntax(text, "toml", background_color="default") if console.is_terminal else text,
-        markup=False,
-        highlight=False,
-        soft_wrap=True,
-    )

@@ -1,9 +1,9 @@
 """``uuv-marl replay``: an episode as a page for the browser, or as a film."""
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -27,25 +27,23 @@ if TYPE_CHECKING:
 
 _SCENARIO, _POLICY = "single_obstacle", "bio_inspired"
 
-Write = Callable[["Sequence[Recording]", Path, Callable[[float], object]], object]
-
 
 def replay(
     run: Annotated[
         Path | None,
-        path_argument("Folder of a benchmark, or a trace of its seed 0. Without it the episode is simulated."),
+        path_argument("Folder of a benchmark, whose scenarios and policies are taken instead of named ones."),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option(help=f"Name or TOML file. Default: {_SCENARIO}, or the folder's only scenario.")
+        str | None, typer.Option(help=f"Name or TOML file. Default: {_SCENARIO}, or the folder's first.")
     ] = None,
     policy: Annotated[
         list[str] | None,
         typer.Option(
             help="Name, checkpoint (runs/starter/best) or module:Class. Repeat it for up to four side by side. "
-            f"Default: {_POLICY}, or the folder's only policy."
+            f"Default: {_POLICY}, or the folder's first four."
         ),
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the episode, for all policies. Default: 0.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the episode, for all policies.")] = 0,
     inspect: Annotated[
         list[int] | None,
         typer.Option(min=0, metavar="VEHICLE", help="Show this vehicle's sonar too. Repeat it for up to eight."),
@@ -58,8 +56,7 @@ def replay(
 ) -> None:
     """Show an episode: as one HTML file that works offline in any browser, or as a film.
 
-    The page has a time line with collisions and near misses, trails, zoom and plots. A simulated episode is shown at
-    every decision, a benchmark's saved seed 0 every 0.5 s, without forces and sonar.
+    The page has a time line with collisions and near misses, trails, zoom and plots.
 
     Example: uuv-marl replay --policy bio_inspired --policy sff --seed 3 --inspect 7
 
@@ -68,26 +65,26 @@ def replay(
     with explained():
         from uuv_marl.errors import ReplayError
 
-        write = _writer(output, inspect or [])
+        is_film = _is_film(output, inspect or [])
         policies = list(dict.fromkeys(policy or []))
         if len(policies) > MOST_EPISODES:
             raise ReplayError(f"at most {MOST_EPISODES} policies can be shown side by side, got {len(policies)}")
-        if run is not None and (inspect or overrides):
-            raise ReplayError(
-                f"{run} holds saved episodes, which --inspect and --set can't change; leave out these two, or leave "
-                "out the folder and give --scenario, --policy and --seed"
-            )
+        start, policies = (
+            (scenario or _SCENARIO, policies or [_POLICY]) if run is None else _saved(run, scenario, policies)
+        )
         try:
             with progress_bar() as bar:
-                if run is None:
-                    recordings = _simulated(
-                        scenario or _SCENARIO, policies or [_POLICY], seed or 0, inspect or [], overrides or [], bar
-                    )
-                else:
-                    recordings = _saved(run, scenario, policies, seed)
-                path = output or _ready(_default(recordings))
+                recordings = _simulated(start, policies, seed, inspect or [], overrides or [], bar)
+                path = output or _ready(_default(recordings, overrides or []))
                 report = progress_line(bar, "writing")
-                write(recordings, path, report)
+                if is_film:
+                    from uuv_marl.replay.film import write_film
+
+                    write_film(recordings, path, sonar_of=inspect[0] if inspect else None, progress=report)
+                else:
+                    from uuv_marl.replay.page import write_page
+
+                    write_page(recordings, path)
                 report(1.0)
         except KeyboardInterrupt:
             say("Stopped; nothing was written.")
@@ -95,8 +92,8 @@ def replay(
         say(f"Replay: {path} ({path.stat().st_size / 1000:,.0f} kB)")
 
 
-def _writer(output: Path | None, inspect: Sequence[int]) -> Write:
-    """The function that writes a file with this suffix. Raises ReplayError before anything is simulated."""
+def _is_film(output: Path | None, inspect: Sequence[int]) -> bool:
+    """Whether a file of this suffix is a film. Raises ReplayError before anything is simulated."""
     from uuv_marl.errors import ReplayError
 
     suffix = ".html" if output is None else output.suffix.lower()
@@ -105,18 +102,13 @@ def _writer(output: Path | None, inspect: Sequence[int]) -> Write:
     if output is not None:
         _ready(output)
     if suffix == ".html":
-        from uuv_marl.replay.page import write_page
-
-        return lambda recordings, path, _: write_page(recordings, path)
+        return False
     if len(inspect) > 1:
         raise ReplayError(f"a film shows the sonar of one vehicle, got {len(inspect)}; give one --inspect, or .html")
-    from uuv_marl.replay.film import check_format, write_film
+    from uuv_marl.replay.film import check_format
 
     check_format(Path(f"film{suffix}"))
-
-    return lambda recordings, path, report: write_film(
-        recordings, path, sonar_of=inspect[0] if inspect else None, progress=report
-    )
+    return True
 
 
 def _ready(output: Path) -> Path:
@@ -132,23 +124,24 @@ def _ready(output: Path) -> Path:
             return output
 
 
-def _default(recordings: "Sequence[Recording]") -> Path:
-    from uuv_marl.benchmark.results import run_name
+def _default(recordings: "Sequence[Recording]", overrides: Sequence[str]) -> Path:
+    from uuv_marl.benchmark.results import file_name
 
     first, policies = recordings[0], "-".join(recording.policy for recording in recordings)
-    return Path("results/replay") / f"{run_name(first.scenario.name, policies, first.seed)}.html"
+    return Path("results/replay") / f"{file_name(f'{first.scenario.name}.{policies}.{first.seed}', overrides)}.html"
 
 
 def _simulated(
-    name: str, policies: Sequence[str], seed: int, inspect: Sequence[int], overrides: Sequence[str], bar: "Progress"
-) -> "list[Recording]":
+    start: str | dict[str, Any], policies: Sequence[str], seed: int, inspect: Sequence[int], overrides: Sequence[str],
+    bar: "Progress",
+) -> "list[Recording]":  # fmt: skip
     """An episode of each policy on the same seed; errors of all are raised before the first is simulated."""
     from uuv_marl.baselines import make_policy, with_policy_requirements
     from uuv_marl.replay.record import checked, record
     from uuv_marl.scenario import load_scenario
 
-    find_modules([name, *policies, *overrides])
-    scenario = load_scenario(name, overrides=changes_of(overrides))
+    find_modules([str(start), *policies, *overrides])
+    scenario = load_scenario(start, overrides=changes_of(overrides))
     checked(inspect, scenario)
     for policy in policies:
         make_policy(policy, with_policy_requirements(policy, scenario))
@@ -160,13 +153,16 @@ def _simulated(
     return recordings
 
 
-def _saved(run: Path, scenario: str | None, policies: Sequence[str], seed: int | None) -> "list[Recording]":
-    """Recordings from a benchmark's saved traces."""
+def _saved(folder: Path, scenario: str | None, policies: Sequence[str]) -> tuple[dict[str, Any], Sequence[str]]:
+    """A scenario of a benchmark's folder, and policies, by default the first ones."""
+    from uuv_marl.benchmark.results import FILE, read_content, source_fingerprint
     from uuv_marl.errors import ReplayError
-    from uuv_marl.replay.traces import from_folder, from_trace
 
-    if run.suffix != ".npz":
-        return [from_folder(run, scenario, policy, seed or 0) for policy in policies or [None]]
-    if scenario or policies or seed is not None:
-        raise ReplayError(f"{run} is one episode; leave out --scenario, --policy and --seed, or give the folder")
-    return [from_trace(run)]
+    content = read_content(folder / FILE, "give the folder of a benchmark, or --scenario and --policy alone")
+    if content["fingerprint"] != source_fingerprint():
+        say(f"{folder} comes from other code of uuv_marl, so that an episode may differ from the saved one.")
+    scenarios = content["scenarios"]
+    name = scenario or min(scenarios)
+    if name not in scenarios:
+        raise ReplayError(f"{folder} holds no {name!r} but {', '.join(sorted(scenarios))}; choose with --scenario")
+    return scenarios[name], policies or sorted(content["policies"])[:MOST_EPISODES]

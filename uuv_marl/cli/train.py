@@ -124,9 +124,8 @@ _OPTIONS = {"overrides": "--set", "scenario": "the scenario"}
 def _alone(context: typer.Context) -> None:
     """Refuse options that the folder determines."""
     for name in context.params:
-        source = context.get_parameter_source(name)
-        on_command_line = source is not None and source.name == "COMMANDLINE"
-        if on_command_line and name not in ("resume", "output", "steps", "minutes"):
+        given = getattr(context.get_parameter_source(name), "name", None) == "COMMANDLINE"
+        if given and name not in ("resume", "output", "steps", "minutes"):
             raise typer.BadParameter(
                 f"--resume continues the training in the folder; leave out {_OPTIONS.get(name, f'--{name}')}"
             )

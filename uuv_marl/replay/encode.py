@@ -6,9 +6,7 @@ differences, then repeatedly the samples halfway between by their difference fro
 Series and the map are exact: they keep all bits of their float32.
 """
 
-import base64
 import math
-import zlib
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -17,8 +15,9 @@ from numpy.typing import NDArray
 
 from uuv_marl import __version__
 from uuv_marl.envs.drawing.camera import shown_speed
+from uuv_marl.replay.html import deflated
 from uuv_marl.replay.recording import Recording
-from uuv_marl.scenario import Scenario, conditions, growth
+from uuv_marl.scenario import conditions, growth
 from uuv_marl.types import Bool, Float32, Float64, Int32, Int64
 
 SCHEMA = 1
@@ -69,7 +68,7 @@ def payload(recordings: Sequence[Recording]) -> dict[str, Any]:
 
 def _episode(recording: Recording) -> dict[str, Any]:
     scenario, groups = recording.scenario, recording.groups
-    arrival, limits = scenario.arrival, scenario.constraints
+    arrival, limits, current = scenario.arrival, scenario.constraints, scenario.current
     return {
         "scenario": scenario.name,
         "version": scenario.version,
@@ -78,7 +77,7 @@ def _episode(recording: Recording) -> dict[str, Any]:
         "vehicles": scenario.swarm.num_vehicles,
         "period_s": scenario.timing.decision_period_s,
         "metrics": recording.metrics,
-        "constraints": {"s_l_m": limits.s_l_m, "s_o_m": limits.s_o_m, "s_u_m": limits.s_u_m},
+        "constraints": limits.model_dump(),
         "hull_radius_m": scenario.collision.hull_radius_m,
         "arrival": {
             "radius_m": arrival.radius_m,
@@ -86,42 +85,28 @@ def _episode(recording: Recording) -> dict[str, Any]:
             "dwell_s": arrival.dwell_s,
         },
         "conditions": conditions(scenario),
-        "current": None if recording.water is None else _current(scenario),
+        "current": recording.water and {"core_m": current.eddy_core_m, "shown_mps": shown_speed(scenario)},
         "paths": [{"team": team, "corners": path.round(2).ravel().tolist()} for team, path in groups.paths.values()],
         "team": groups.team.tolist(),
         "uninformed": np.flatnonzero(~groups.informed).tolist(),
-        "sonar": _sonar(scenario),
+        "sonar": [
+            {
+                "name": array.name,
+                "axis_rad": math.radians(array.mounting_deg),
+                "aperture_rad": math.radians(array.aperture_deg),
+                "range_m": array.range_m,
+                "active": array.kind == "active",
+                "bounds_rad": array.bounds_rad.tolist(),
+            }
+            for array in scenario.sonar.arrays
+        ],
         "events": [event._asdict() for event in recording.events],
         "inspected": list(recording.inspections),
         "arrays": _arrays(recording),
     }
 
 
-def _current(scenario: Scenario) -> dict[str, float]:
-    """Numbers to draw the current, besides the arrays ``drift`` and ``eddies``."""
-    return {"core_m": scenario.current.eddy_core_m, "shown_mps": shown_speed(scenario)}
-
-
-def _sonar(scenario: Scenario) -> list[dict[str, Any]]:
-    """The arrays in the order of their sub-sectors, whose bounds are angles clockwise from the bow [rad]."""
-    return [
-        {
-            "name": array.name,
-            "axis_rad": math.radians(array.mounting_deg),
-            "aperture_rad": math.radians(array.aperture_deg),
-            "range_m": array.range_m,
-            "active": array.kind == "active",
-            "bounds_rad": [
-                math.radians(array.mounting_deg + array.aperture_deg * (k / array.sub_sectors - 0.5))
-                for k in range(array.sub_sectors + 1)
-            ],
-        }
-        for array in scenario.sonar.arrays
-    ]
-
-
 def _arrays(recording: Recording) -> dict[str, Any]:
-    tick_s = recording.scenario.timing.control_step_s
     smooth = {
         "reference": np.concatenate([recording.references[:, g] for g in recording.groups.paths], axis=1),
         "position": recording.position,
@@ -131,20 +116,21 @@ def _arrays(recording: Recording) -> dict[str, Any]:
         "spacing": recording.spacing,
         "traffic": recording.traffic,
     }
-    exact = {**recording.series, "waypoints": recording.waypoints, "obstacles": recording.obstacles}
-    exact["marks"] = recording.marks
+    exact = {
+        **recording.series,
+        "waypoints": recording.waypoints,
+        "obstacles": recording.obstacles,
+        "marks": recording.marks,
+    }
     if recording.water is not None:
         smooth["drift"], exact["eddies"] = recording.water.drift, recording.water.eddies.astype(np.float32)
-    arrays = {"time_s": _coded(recording.time_s, Coding(tick_s, stride=1))}
-    arrays |= {name: _bits(np.asarray(values, np.float32)) for name, values in exact.items()}
-    if recording.inspections:
-        inspected = list(recording.inspections)
-        arrays["detected_index"] = _whole(
-            np.stack([sonar.detected_index for sonar in recording.inspections.values()], axis=1), 1
-        )
-        smooth["inspected_heading"] = unwrapped(recording.heading[:, inspected])
+    arrays = {"time_s": _coded(recording.time_s, Coding(recording.scenario.timing.control_step_s, stride=1))}
+    arrays |= {name: _exact(values, 2) for name, values in exact.items()}
+    if sonars := list(recording.inspections.values()):
+        arrays["detected_index"] = _exact(np.stack([sonar.detected_index for sonar in sonars], axis=1), 1)
+        smooth["inspected_heading"] = unwrapped(recording.heading[:, list(recording.inspections)])
         for name in ("neighbour", "echo_range", "echo_position", "action"):
-            smooth[name] = np.stack([getattr(sonar, name) for sonar in recording.inspections.values()], axis=1)
+            smooth[name] = np.stack([getattr(sonar, name) for sonar in sonars], axis=1)
     return arrays | {name: _coded(values, CODINGS[name]) for name, values in smooth.items() if values is not None}
 
 
@@ -165,14 +151,9 @@ def _coded(values: Float32, coding: Coding) -> dict[str, Any]:
     return _entry(values, data, coding.unit, coding.stride, coding.order, mask)
 
 
-def _bits(values: Float32) -> dict[str, Any]:
-    """An array with all its bits."""
-    return _entry(values, _differences(values.view(np.int32), 2))
-
-
-def _whole(values: Int32, order: int) -> dict[str, Any]:
-    """An array of integers."""
-    return _entry(values, _differences(values, order), order=order)
+def _exact(values: NDArray[Any], order: int) -> dict[str, Any]:
+    """An array of 32 bits with all of them, by differences of this order."""
+    return _entry(values, _differences(values.view(np.int32), order), order=order)
 
 
 def _entry(
@@ -236,5 +217,4 @@ def pack(values: Int32) -> str:
     unsigned = ((values << 1) ^ (values >> 31)).view(np.uint32)
     planes = max(1, math.ceil(int(unsigned.max(initial=0)).bit_length() / 8))
     rows = unsigned.astype("<u4").view(np.uint8).reshape(-1, 4).T[:planes]
-    deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS, 6, zlib.Z_FILTERED)
-    return base64.b64encode(deflate.compress(np.ascontiguousarray(rows).tobytes()) + deflate.flush()).decode("ascii")
+    return deflated(rows.tobytes())

@@ -2,8 +2,9 @@
 
 import importlib
 from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,18 +27,6 @@ _LENGTH_S, _HOLD_S = {".mp4": 20.0, ".gif": 10.0}, 2.0
 _FPS = {".mp4": 20, ".gif": 8}
 _MOMENTS = 4
 """Number of moments that a still shows side by side."""
-
-
-class Format(NamedTuple):
-    """Size and timing of a film."""
-
-    size: tuple[int, int]
-    """Width and height [px]."""
-    fps: int
-    plain: bool
-    """Whether trails and grid are left out."""
-    speed: float
-    """Seconds of the episode in each second of the film."""
 
 
 def write_film(
@@ -75,20 +64,26 @@ def write_film(
         raise ReplayError(f"size must be width and height, even numbers of pixels from 320 to 4096, got {size}")
     scenes = [Scenes(recording, sonar_of, trails=suffix != ".gif") for recording in recordings]
     longest = max(float(recording.time_s[-1]) for recording in recordings)
-    form = Format(
-        size or _size(suffix, len(recordings)),
-        _FPS.get(suffix, 1),
-        suffix == ".gif",
-        speed or max(1.0, round(longest / _LENGTH_S.get(suffix, longest))),
-    )
+    size = size or _size(suffix, len(recordings))
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as partial:
         if suffix == ".png":
-            Image.fromarray(_still(scenes, form, camera, longest)).save(partial, optimize=True)
-        else:
-            write = _write_mp4 if suffix == ".mp4" else _write_gif
-            write(partial, _pictures(scenes, form, camera, longest, progress or (lambda share: share)), form)
+            Image.fromarray(_still(scenes, size, camera, longest)).save(partial, optimize=True)
+            return
+        frame, (common, names) = Frame(size, len(scenes), grid=suffix != ".gif"), _names(scenes)
+        fps, speed = _FPS[suffix], speed or max(1.0, round(longest / _LENGTH_S[suffix]))
+        heading = f"{common}, {speed:.3g} times as fast" if speed != 1.0 else common
+        num = int(np.ceil(longest / speed * fps)) + 1
+
+        def pictures() -> Iterator[Picture]:
+            for k in range(num):
+                panels = [Panel(name, one.at(k * speed / fps)) for name, one in zip(names, scenes, strict=True)]
+                yield pixels(frame.draw(panels, camera, heading))
+                if progress:
+                    progress((k + 1) / num)
+
+        (_write_mp4 if suffix == ".mp4" else _write_gif)(partial, pictures(), fps)
 
 
 def check_format(path: Path) -> str:
@@ -121,21 +116,7 @@ def _names(scenes: Sequence[Scenes]) -> tuple[str, list[str]]:
     return common, [", ".join(word for word, same in zip(row, shared, strict=True) if not same) for row in rows]
 
 
-def _pictures(
-    scenes: Sequence[Scenes], form: Format, camera: str, longest: float, progress: Callable[[float], object]
-) -> Iterator[Picture]:
-    """The pictures of a film."""
-    frame, (common, names) = Frame(form.size, len(scenes), grid=not form.plain), _names(scenes)
-    heading = f"{common}, {form.speed:.3g} times as fast" if form.speed != 1.0 else common
-    num = int(np.ceil(longest / form.speed * form.fps)) + 1
-    for k in range(num):
-        now = k * form.speed / form.fps
-        panels = [Panel(name, one.at(now)) for name, one in zip(names, scenes, strict=True)]
-        yield pixels(frame.draw(panels, camera, heading))
-        progress((k + 1) / num)
-
-
-def _still(scenes: Sequence[Scenes], form: Format, camera: str, longest: float) -> Picture:
+def _still(scenes: Sequence[Scenes], size: tuple[int, int], camera: str, longest: float) -> Picture:
     """A row of moments for each recording, up to the end of the longest one."""
     common, names = _names(scenes)
     moments = np.linspace(0.0, longest, _MOMENTS).tolist()
@@ -144,29 +125,29 @@ def _still(scenes: Sequence[Scenes], form: Format, camera: str, longest: float) 
         for name, one in zip(names, scenes, strict=True)
         for now in moments
     ]
-    return pixels(Frame(form.size, _MOMENTS).draw(panels, camera, common))
+    return pixels(Frame(size, _MOMENTS).draw(panels, camera, common))
 
 
-def _write_gif(path: Path, pictures: Iterator[Picture], form: Format) -> None:
+def _write_gif(path: Path, pictures: Iterator[Picture], fps: int) -> None:
     """Write a GIF with one palette of few colours for all frames, which compresses static parts."""
     palette = Image.new("P", (1, 1))
     palette.putpalette([part for colour in ink.palette() for part in colour])
     frames = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    durations = [round(1000 / form.fps)] * (len(frames) - 1) + [round(1000 * _HOLD_S)]
+    durations = [round(1000 / fps)] * (len(frames) - 1) + [round(1000 * _HOLD_S)]
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=durations, loop=0, optimize=True)
 
 
-def _write_mp4(path: Path, pictures: Iterator[Picture], form: Format) -> None:
+def _write_mp4(path: Path, pictures: Iterator[Picture], fps: int) -> None:
     """Write an MP4 in H.264, which all browsers play."""
     av = _av()
+    last = first = next(pictures)
     with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
-        stream = container.add_stream("libx264", rate=form.fps, options={"crf": "23", "preset": "veryfast"})
-        stream.width, stream.height, stream.pix_fmt = *form.size, "yuv420p"
-        picture = np.zeros((*form.size[::-1], 3), np.uint8)
-        for picture in pictures:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-        for _ in range(round(_HOLD_S * form.fps)):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        stream = container.add_stream("libx264", rate=fps, options={"crf": "23", "preset": "veryfast"})
+        stream.height, stream.width, stream.pix_fmt = *first.shape[:2], "yuv420p"
+        for last in chain([first], pictures):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(last, format="rgb24")))
+        for _ in range(round(_HOLD_S * fps)):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(last, format="rgb24")))
         container.mux(stream.encode())
 
 

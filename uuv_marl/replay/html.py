@@ -24,7 +24,7 @@ def html_of(data: Mapping[str, Any]) -> str:
         "style": f"{_asset('uPlot.min.css')}\n{_asset('page.css')}",
         "licence": html.escape(_asset("uPlot.LICENSE")),
         "episodes": json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
-        "uplot": _deflated(_asset("uPlot.iife.min.js")),
+        "uplot": deflated(_asset("uPlot.iife.min.js").encode()),
         "scripts": _scripts(),
     }
     return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], _asset("page.html"))
@@ -40,10 +40,10 @@ def _asset(name: str) -> str:
     return (_ASSETS / name).read_text(encoding="utf-8")
 
 
-def _deflated(text: str) -> str:
-    """Compressed text for ``inflate`` of ``decode.js``."""
-    deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
-    return base64.b64encode(deflate.compress(text.encode()) + deflate.flush()).decode("ascii")
+def deflated(data: bytes) -> str:
+    """Compressed data in base64, for ``inflate`` of ``decode.js``."""
+    deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS, 6, zlib.Z_FILTERED)
+    return base64.b64encode(deflate.compress(data) + deflate.flush()).decode("ascii")
 
 
 def _scripts() -> str:

@@ -13,18 +13,14 @@ from uuv_marl.replay.html import html_of, title_of
 from uuv_marl.replay.recording import Recording
 
 
-def page_html(recordings: Sequence[Recording]) -> str:
-    """One to four episodes side by side, as a self-contained page.
+def write_page(recordings: Sequence[Recording], path: UserPath) -> None:
+    """Write one to four episodes side by side as a self-contained page, atomically.
 
     Raises:
-        ReplayError: there are none, or more than four.
+        ReplayError: there are no recordings, or more than four.
+        ResultsError: the file can't be written.
     """
-    return html_of(_coded(recordings))
-
-
-def write_page(recordings: Sequence[Recording], path: UserPath) -> None:
-    """Write ``page_html`` to a file atomically. Raises ResultsError where it can't be written."""
-    write_text(user_path(path), page_html(recordings))
+    write_text(user_path(path), html_of(_coded(recordings)))
 
 
 class Replay:

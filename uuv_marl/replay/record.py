@@ -1,6 +1,6 @@
 """Recording an episode while the benchmark's evaluation simulates it."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,10 @@ from uuv_marl.types import Float32
 
 MOST_INSPECTED = 8
 """Most vehicles with recorded sonar."""
+_KINDS: dict[str, DTypeLike] = {
+    "alive": np.bool_, **dict.fromkeys(("vehicle_collisions", "collisions", "detected_index"), np.int32)
+}  # fmt: skip
+"""Types of samples that are not float32."""
 
 
 def record(
@@ -65,44 +69,38 @@ def checked(inspect: Iterable[int], scenario: Scenario) -> list[int]:
 class _Tape:
     """Copies of the state of a swarm of one world after its reset and after every step."""
 
-    def __init__(self, inspect: Sequence[int]) -> None:
+    def __init__(self, inspect: list[int]) -> None:
         self._inspect = inspect
-        self._eddies = np.zeros((0, 3))
         self._samples: dict[str, list[NDArray[Any]]] = {}
-        self._actions: list[Float32] = []
+        self._swarm: Swarm
         self._groups: Groups
 
     def __call__(self, swarm: Swarm, action: Float32 | None) -> None:
         """Record world 0; a ``watch`` of the evaluation."""
-        eta, velocity, facts = swarm.state.eta[0], swarm.velocity[0], swarm.facts
-        seen = list(self._inspect)
-        percept = swarm.percept
-        self._add("time_s", facts.time_s[0])
+        self._swarm, facts, seen = swarm, swarm.facts, self._inspect
         if action is None:
             self._groups = groups_of(swarm)
-        self._add("references", facts.reference[0, :, :2])
-        self._add("marks", swarm.task.marks(0))
-        self._add("traffic", swarm.world_map.obstacles[0, : swarm.world_map.num_obstacles[0], :2])
-        self._add("drift", swarm.flow_field().drift)
-        self._eddies = swarm.flow_field().eddies
-        self._add("position", eta[:, :2])
-        self._add("heading", eta[:, 2])
-        self._add("speed", np.hypot(velocity[:, 0], velocity[:, 1]))
-        self._add("force", np.sqrt(facts.effort[0]))
-        self._add("spacing", facts.spacing[0])
-        self._add("clearance", facts.clearance[0])
-        self._add("alive", swarm.state.alive[0], np.bool_)
-        self._add("vehicle_collisions", facts.vehicle_collisions[0], np.int32)
-        self._add("collisions", facts.collisions[0], np.int32)
-        self._add("detected_index", swarm.detected_index[0, seen], np.int32)
-        for name in ("neighbour", "echo", "echo_range", "echo_position"):
-            self._add(name, percept[name][0, seen])
-        if action is not None:
-            self._actions.append(np.array(action[0, seen], np.float32))
-
-    def _add(self, name: str, values: ArrayLike, kind: DTypeLike = np.float32) -> None:
-        copy: NDArray[Any] = np.array(values, kind)
-        self._samples.setdefault(name, []).append(copy)
+        now: dict[str, ArrayLike] = {
+            "time_s": facts.time_s[0],
+            "references": facts.reference[0, :, :2],
+            "marks": swarm.task.marks(0),
+            "traffic": swarm.world_map.obstacles[0, : swarm.world_map.num_obstacles[0], :2],
+            "drift": swarm.flow_field().drift,
+            "position": swarm.state.eta[0, :, :2],
+            "heading": swarm.state.eta[0, :, 2],
+            "speed": np.hypot(*swarm.velocity[0].T),
+            "force": np.sqrt(facts.effort[0]),
+            "spacing": facts.spacing[0],
+            "clearance": facts.clearance[0],
+            "alive": swarm.state.alive[0],
+            "vehicle_collisions": facts.vehicle_collisions[0],
+            "collisions": facts.collisions[0],
+            "detected_index": swarm.detected_index[0, seen],
+            "action": np.full((len(seen), 2), np.nan) if action is None else action[0, seen],
+            **{name: swarm.percept[name][0, seen] for name in ("neighbour", "echo", "echo_range", "echo_position")},
+        }
+        for name, values in now.items():
+            self._samples.setdefault(name, []).append(np.array(values, _KINDS.get(name, np.float32)))
 
     def recording(self, scenario: Scenario, policy: str, run: Run) -> Recording:
         """The recording of the run."""
@@ -126,28 +124,26 @@ class _Tape:
             heading=_where(alive, tape["heading"]),
             speed=_where(alive, tape["speed"]),
             series={
-                "min_spacing_m": finite(run.series["min_spacing_m"]),
-                "obstacle_clearance_m": finite(run.series["obstacle_distance_m"].min(axis=1, initial=np.inf)),
+                "min_spacing_m": _finite(run.series["min_spacing_m"]),
+                "obstacle_clearance_m": _finite(run.series["obstacle_distance_m"].min(axis=1, initial=np.inf)),
                 "centre_error_m": run.series["centre_error_m"],
                 "collisions": np.cumsum(tape["collisions"]).astype(np.float32),
             },
             events=_events(scenario, tape, run),
             force=_where(alive, tape["force"]),
-            spacing=finite(tape["spacing"]),
+            spacing=_finite(tape["spacing"]),
+            clearance=tape["clearance"],
             inspections=self._inspections(tape),
-            water=Water(tape["drift"], self._eddies) if scenario.current.flows else None,
+            water=Water(tape["drift"], self._swarm.flow_field().eddies) if scenario.current.flows else None,
         )
 
     def _inspections(self, tape: dict[str, NDArray[Any]]) -> dict[int, Inspection]:
-        steps = len(self._actions)
-        asked = np.full((steps + 1, len(self._inspect), 2), np.nan, np.float32)
-        asked[:steps] = self._actions
-        asked = _where(tape["alive"][:, list(self._inspect)], asked)
-        echo = tape["echo"] > 0
-        neighbour = _where(tape["detected_index"] >= 0, tape["neighbour"])
+        detected, echo = tape["detected_index"], tape["echo"] > 0
+        neighbour = _where(detected >= 0, tape["neighbour"])
         reach, place = _where(echo, tape["echo_range"]), _where(echo, tape["echo_position"])
+        asked = _where(tape["alive"][:, self._inspect], np.roll(tape["action"], -1, axis=0))
         return {
-            i: Inspection(tape["detected_index"][:, k], neighbour[:, k], reach[:, k], place[:, k], asked[:, k])
+            i: Inspection(detected[:, k], neighbour[:, k], reach[:, k], place[:, k], asked[:, k])
             for k, i in enumerate(self._inspect)
         }
 
@@ -172,6 +168,6 @@ def _where(valid: NDArray[Any], values: NDArray[Any]) -> Float32:
     return np.where(valid.reshape(valid.shape + (1,) * (values.ndim - valid.ndim)), values, np.float32(np.nan))
 
 
-def finite(values: Float32) -> Float32:
+def _finite(values: Float32) -> Float32:
     """The values, NaN where they are infinite."""
     return np.where(np.isfinite(values), values, np.float32(np.nan))

@@ -18,7 +18,7 @@ class Event(NamedTuple):
     """``collision`` of two vehicles, ``obstacle`` with an obstacle, ``near`` and ``near_obstacle`` where spacing
     falls below s_u or clearance below s_o, ``lost``, or ``arrived`` for the swarm."""
     vehicles: tuple[int, ...]
-    """Indices of the vehicles; empty for the swarm, and where a saved trace does not name them."""
+    """Indices of the vehicles; empty for the swarm."""
 
 
 class Inspection(NamedTuple):
@@ -52,8 +52,7 @@ class Water(NamedTuple):
 class Recording(NamedTuple):
     """One episode: the scenario, and all vehicles at each sample.
 
-    There is a sample at the start and one for each decision; a saved trace has one every 0.5 s. Frame north, east [m];
-    NaN once a vehicle is lost. Arrays that a saved trace does not hold are None.
+    There is a sample at the start and one for each decision. Frame north, east [m]; NaN once a vehicle is lost.
     """
 
     scenario: Scenario
@@ -82,12 +81,14 @@ class Recording(NamedTuple):
     """Speed over ground [m/s], shape (time, vehicle)."""
     series: dict[str, Float32]
     """``min_spacing_m`` and ``obstacle_clearance_m``, the smallest since the sample before, ``centre_error_m``, and
-    ``collisions`` so far (not of a trace), shape (time,) each; NaN where the value does not exist."""
+    ``collisions`` so far, shape (time,) each; NaN where the value does not exist."""
     events: list[Event]
-    force: Float32 | None
+    force: Float32
     """Length of the action since the sample before, as a share of full force, shape (time, vehicle); 0 at the start."""
-    spacing: Float32 | None
+    spacing: Float32
     """Smallest distance to another vehicle since the sample before [m], NaN for none, shape (time, vehicle)."""
+    clearance: Float32
+    """Smallest distance to an obstacle's surface since the sample before [m], infinite for none, as ``spacing``."""
     inspections: dict[int, Inspection]
     """Inspections by index of the vehicle."""
     water: Water | None

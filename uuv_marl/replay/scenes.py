@@ -4,9 +4,8 @@ import numpy as np
 
 from uuv_marl.envs.drawing.scene import TRAIL_S, Scene, SonarView
 from uuv_marl.errors import ReplayError
-from uuv_marl.replay.recording import Event, Inspection, Recording
+from uuv_marl.replay.recording import Recording
 from uuv_marl.sim.disturbances.current import FlowField
-from uuv_marl.types import Bool
 
 
 class Scenes:
@@ -30,17 +29,23 @@ class Scenes:
         vehicles = np.arange(recording.scenario.swarm.num_vehicles)
         self._position = recording.position[last, vehicles]
         self._heading = recording.heading[last, vehicles]
-        self._collisions = [event for event in recording.events if event.kind in ("collision", "obstacle")]
-        self._hits = np.array([self._place(event) for event in self._collisions if event.vehicles]).reshape(-1, 3)
+        self._hits = np.array(
+            [
+                [*self._position[np.searchsorted(recording.time_s, time_s), list(vehicles)].mean(axis=0), time_s]
+                for time_s, kind, vehicles in recording.events
+                if kind in ("collision", "obstacle")
+            ]
+        ).reshape(-1, 3)
 
     def at(self, time_s: float) -> Scene:
         """The scene of the latest sample up to this time [s]."""
-        recording = self.recording
+        recording, limits = self.recording, self.recording.scenario.constraints
         k = max(int(np.searchsorted(recording.time_s, time_s + 1e-6, side="right")) - 1, 0)
         now, alive = float(recording.time_s[k]), self._alive[k]
         past = np.unique(np.searchsorted(recording.time_s, now - self._back_s))
         series = {name: float(values[k]) for name, values in recording.series.items()}
         arrival_s = recording.metrics["task_time_s"]
+        water, core_m = recording.water, recording.scenario.current.eddy_core_m
         return Scene(
             scenario=recording.scenario,
             waypoints=recording.waypoints,
@@ -52,46 +57,21 @@ class Scenes:
             position=self._position[k],
             heading=self._heading[k],
             alive=alive,
-            near=alive & self._near(k),
+            near=alive & ((recording.spacing[k] < limits.s_u_m) | (recording.clearance[k] < limits.s_o_m)),
             trail=self._position[past],
             hits=self._hits[self._hits[:, 2] <= now],
             arrival_s=arrival_s if arrival_s is not None and arrival_s <= now else None,
-            collisions=round(series.get("collisions", sum(event.time_s <= now for event in self._collisions))),
-            min_spacing_m=_distance(series["min_spacing_m"]),
-            clearance_m=_distance(series["obstacle_clearance_m"]),
+            collisions=round(series["collisions"]),
+            min_spacing_m=float(np.nan_to_num(series["min_spacing_m"], nan=np.inf)),
+            clearance_m=float(np.nan_to_num(series["obstacle_clearance_m"], nan=np.inf)),
             centre_error_m=series["centre_error_m"],
             sonar=self._sonar(k),
-            water=self._water(k),
+            water=water and FlowField(water.drift[k].astype(np.float64), water.eddies, core_m),
         )
-
-    def _near(self, k: int) -> Bool:
-        recording, limits = self.recording, self.recording.scenario.constraints
-        discs, position = recording.discs(k), self._position[k]
-        offset = position[:, None] - discs[None, :, :2]
-        near = (np.hypot(offset[..., 0], offset[..., 1]) - discs[:, 2] < limits.s_o_m).any(axis=1)
-        return near if recording.spacing is None else near | (recording.spacing[k] < limits.s_u_m)
-
-    def _water(self, k: int) -> FlowField | None:
-        recording = self.recording
-        if recording.water is None:
-            return None
-        core_m = recording.scenario.current.eddy_core_m
-        return FlowField(recording.water.drift[k].astype(np.float64), recording.water.eddies, core_m)
-
-    def _place(self, event: Event) -> list[float]:
-        """North, east and time of a collision."""
-        k = int(np.searchsorted(self.recording.time_s, event.time_s))
-        north, east = self._position[min(k, len(self._position) - 1), list(event.vehicles)].mean(axis=0).tolist()
-        return [north, east, event.time_s]
 
     def _sonar(self, k: int) -> SonarView | None:
         i = self._sonar_of
         if i is None or not self._alive[k, i]:
             return None
-        inspection: Inspection = self.recording.inspections[i]
+        inspection = self.recording.inspections[i]
         return SonarView(i, inspection.neighbour[k][inspection.detected_index[k] >= 0], inspection.echo_range[k])
-
-
-def _distance(metres: float) -> float:
-    """The distance, infinite for NaN."""
-    return metres if np.isfinite(metres) else np.inf

@@ -172,13 +172,6 @@ class Fault(Section):
                 f"faults.array must be given for kind array and for no other kind, got {self.array!r} for kind "
                 f"{self.kind}"
             )
-        if self.efficiency > 0.0 and self.kind not in ("thruster", "yaw"):
-            raise ValueError(
-                f"faults.efficiency is only for kinds thruster and yaw, got {self.efficiency:g} for kind {self.kind}; "
-                "leave it out"
-            )
-        if self.duration_s is not None and self.kind == "member":
-            raise ValueError(
-                f"faults.duration_s is of no use to kind member, got {self.duration_s:g}: a lost vehicle stays lost; "
-                "leave it out"
-            )
+        for name, useless in (("efficiency", ("array", "member")), ("duration_s", ("member",))):
+            if (value := getattr(self, name)) and self.kind in useless:
+                raise ValueError(f"faults.{name} is of no use to kind {self.kind}, got {value:g}; leave it out")

@@ -1,23 +1,15 @@
 """Types of a scenario's fields: plausible ranges, names, and the base class of sections."""
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 MAX_RANGE_M = 4096.0  # largest position in a percept, so that observations are bounded
 
 
-def within(low: float, high: float) -> AfterValidator:
-    """Validator of a number's plausible range, both ends included."""
-
-    def check(value: float) -> float:
-        if not low <= value <= high:
-            limits = {"low": f"{low:,.9g}", "high": f"{high:,.9g}"}
-            raise PydanticCustomError("range", "must lie within {low} to {high}", limits)
-        return value
-
-    return AfterValidator(check)
+def within(low: float, high: float) -> Any:
+    """A number's plausible range, both ends included."""
+    return Field(ge=low, le=high)
 
 
 Signed = Annotated[float, within(-1_000_000, 1_000_000)]

@@ -16,7 +16,7 @@ from uuv_marl.scenario.fields import NAME
 from uuv_marl.scenario.messages import explain, shown
 from uuv_marl.scenario.overrides import assign, leaves, plain
 from uuv_marl.scenario.scenario import Scenario
-from uuv_marl.scenario.vehicle_files import load_vehicle, optional_defaults, variant_comments, vehicle_file
+from uuv_marl.scenario.vehicle_files import load_vehicle, optional_defaults, vehicle_file
 
 _FOLDER = Path(__file__).resolve().parent
 _BASE = _FOLDER / "base.toml"
@@ -103,8 +103,9 @@ def show(name: UserPath) -> str:
         if optional_defaults(file.data.get("vehicle")) is not None:
             sources = {field: source for field, source in sources.items() if not field.startswith("vehicle.")}
         own = "" if file.path.is_relative_to(_FOLDER) else f"# {file.path.name}"
-        sources |= {field: item.trivia.comment or own for field, item in items(tomlkit.parse(file.text))}
-        sources |= variant_comments(file)
+        stated = {field: item.trivia.comment or own for field, item in items(tomlkit.parse(file.text))}
+        for prefix in ("", *(f"variants.{name}." for name in file.variants)):
+            sources |= {field.removeprefix(prefix): stated[field] for field in stated if field.startswith(prefix)}
     for field, item in items(document):
         if "." in field and sources.get(field):
             item.trivia.comment_ws, item.trivia.comment = "  ", sources[field]

@@ -7,14 +7,14 @@ paper's Eq. 4.
 import math
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from uuv_marl.scenario import fields
 from uuv_marl.scenario.fields import Lag, NonNegative, NonPositive, Positive, Radius, Section, Signed, Speed, within
+from uuv_marl.types import Float64
 
 MIN_SECTOR_DEG, MAX_SECTOR_DEG = 0.01, 120.0  # widths of sub-sectors that the sonar's table of directions supports
-CHANNEL_NAMES = ("compass", "identity", "link", "current", "age", "ranged", "modem", "episode")
-"""Channels of every task."""
 
 
 class Vehicle(Section):
@@ -120,22 +120,20 @@ class Actuators(Section):
         return side * self.Y_uud, side * self.N_uud
 
     def _check(self) -> None:
-        fin = {name: getattr(self, name) for name in ("Y_uud", "N_uud", "rudder_max_deg")}
-        if self.kind == "force_torque":
-            set_one = next((name for name, value in fin.items() if value), None)
-            if set_one:
+        rudder = self.kind == "rudder"
+        for name in ("Y_uud", "N_uud", "rudder_max_deg"):
+            value = getattr(self, name)
+            if value and not rudder:
                 raise ValueError(
-                    f"actuators.{set_one} = {fin[set_one]:g} is a rudder's, and actuators.kind is 'force_torque'; set "
-                    "it to 0, or actuators.kind = 'rudder'"
+                    f"actuators.{name} = {value:g} is a rudder's, and actuators.kind is 'force_torque'; set it to 0, "
+                    "or actuators.kind = 'rudder'"
                 )
-            return
-        for name in ("N_uud", "rudder_max_deg"):
-            if not fin[name]:
+            if rudder and not value and name != "Y_uud":
                 raise ValueError(
                     f"actuators.{name} must not be 0 where actuators.kind is 'rudder': it would never turn; set it, or "
                     "actuators.kind = 'force_torque'"
                 )
-        if self.yaw_damping_nms > 0.0:
+        if rudder and self.yaw_damping_nms > 0.0:
             raise ValueError(
                 f"actuators.yaw_damping_nms must be 0 where actuators.kind is 'rudder', got {self.yaw_damping_nms:g}: "
                 "a rudder has no torque of its own to damp with; set it to 0"
@@ -158,17 +156,18 @@ class SonarArray(Section):
     sub_sectors: Annotated[int, within(1, 64)]
     """k_a (Eq. 12)."""
 
+    @property
+    def bounds_rad(self) -> Float64:
+        """Edges of the sub-sectors, clockwise from the bow, shape (sub-sector + 1,)."""
+        return np.radians(self.mounting_deg + self.aperture_deg * np.linspace(-0.5, 0.5, self.sub_sectors + 1))
+
     def _check(self) -> None:
         width = self.aperture_deg / self.sub_sectors
-        if width > MAX_SECTOR_DEG:
+        if not MIN_SECTOR_DEG <= width <= MAX_SECTOR_DEG:
             raise ValueError(
-                f"sonar.arrays.{self.name}.sub_sectors must leave sub-sectors of at most {MAX_SECTOR_DEG:g} deg, "
-                f"got {width:g} deg; use at least {math.ceil(self.aperture_deg / MAX_SECTOR_DEG)}"
-            )
-        if width < MIN_SECTOR_DEG:
-            raise ValueError(
-                f"sonar.arrays.{self.name}.sub_sectors must leave sub-sectors of at least {MIN_SECTOR_DEG:g} deg, "
-                f"got {width:g} deg; lower it or raise aperture_deg"
+                f"sonar.arrays.{self.name}.sub_sectors must leave sub-sectors of {MIN_SECTOR_DEG:g} to "
+                f"{MAX_SECTOR_DEG:g} deg, got {width:g} deg; use at least "
+                f"{math.ceil(self.aperture_deg / MAX_SECTOR_DEG)} and at most {self.aperture_deg / MIN_SECTOR_DEG:.0f}"
             )
 
 

@@ -9,21 +9,13 @@ from uuv_marl.errors import nearest
 
 _SHOWN = 80
 _EXPLANATIONS = {
-    "range": "{message}",
-    "float_type": "must be a number",
-    "int_type": "must be a whole number",
-    "bool_type": "must be true or false",
-    "string_type": "must be a text",
     "tuple_type": "must be a list",
-    "literal_error": "must be {expected}",
     "string_pattern_mismatch": "must hold letters, digits, _ and - only",
     "model_type": "must be a table of fields",
     "too_short": "must have at least {min_length} entries",
     "too_long": "must have at most {max_length} entries",
-    "string_too_short": "must not be empty",
-    "string_too_long": "must have at most {max_length} characters",
-    "invalid_key": "must be a text",
 }
+"""Words for kinds of errors that pydantic words as errors of Python's types."""
 
 
 def explain(
@@ -69,15 +61,13 @@ def _line(error: dict[str, Any], data: object, fields: Sequence[str], prefix: st
 
 
 def _nearest(location: Sequence[str | int], fields: Sequence[str], prefix: str) -> str:
-    """Suggestion for an unknown field: the same name elsewhere, a similar one here, a similar one elsewhere."""
+    """Suggestion for an unknown field: a similar name here, else anywhere."""
     last, table = str(location[-1]), "".join(f"{0 if isinstance(part, int) else part}." for part in location[:-1])
     here = dict.fromkeys(field.removeprefix(table).partition(".")[0] for field in fields if field.startswith(table))
-    leaves = {field.rpartition(".")[2]: prefix + field for field in reversed(fields)}
-    nested = {name: prefix + ".".join(map(str, (*location[:-1], name))) for name in here}
-    near = (
-        leaves.get(last) or nested.get(nearest(last, nested, 0.5) or "") or leaves.get(nearest(last, leaves, 0.5) or "")
-    )
-    return f"; did you mean {near!r}?" if near else f"; the fields here are {', '.join(here) or 'none'}"
+    known = {field.rpartition(".")[2]: prefix + field for field in reversed(fields)}
+    known |= {name: prefix + ".".join(map(str, (*location[:-1], name))) for name in here}
+    near = nearest(last, here, 0.5) or nearest(last, known, 0.5)
+    return f"; did you mean {known[near]!r}?" if near else f"; the fields here are {', '.join(here) or 'none'}"
 
 
 def _fields(model: Any, prefix: str = "") -> Iterator[str]:

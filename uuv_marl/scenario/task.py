@@ -7,7 +7,6 @@ from pydantic import ConfigDict, ValidationError
 from uuv_marl.errors import ScenarioError, hint
 from uuv_marl.modules import named_object
 from uuv_marl.scenario.fields import Section
-from uuv_marl.scenario.hardware import CHANNEL_NAMES
 from uuv_marl.scenario.messages import explain
 
 
@@ -22,6 +21,8 @@ class TaskSettings(Section):
 
 def named_task(value: Any) -> Any:
     """A table with a task's name, if only the name is given."""
+    if isinstance(value, type):
+        raise ValueError(f"must be a name; give module:Class, such as '{value.__module__}:{value.__qualname__}'")
     return {"name": value} if isinstance(value, str) else value
 
 
@@ -42,12 +43,13 @@ def check_task(task: TaskSettings) -> None:
 
 def check_channels(task: TaskSettings, channels: tuple[str, ...]) -> None:
     """Raise ScenarioError for a channel that is neither common to all tasks nor the task's own."""
+    common = cast(tuple[str, ...], named_object("uuv_marl.percept:CHANNELS")) if channels else ()
     for channel in channels:
-        if channel not in CHANNEL_NAMES and channel not in (own := task_class(task.name).channels):
+        if channel not in common and channel not in (own := task_class(task.name).channels):
             having = [name for name in shipped_tasks() if channel in task_class(name).channels]
             raise ScenarioError(
                 f"sonar.channels can't hold {channel!r} with task {task.name!r}, whose channels are "
-                f"{', '.join((*CHANNEL_NAMES, *own))}" + "".join(f"; task {name!r} has it" for name in having)
+                f"{', '.join((*common, *own))}" + "".join(f"; task {name!r} has it" for name in having)
             )
 
 

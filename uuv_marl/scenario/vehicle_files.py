@@ -3,11 +3,9 @@
 from pathlib import Path
 from typing import Any, cast
 
-import tomlkit
-
 from uuv_marl.errors import ScenarioError, hint
 from uuv_marl.paths import user_path
-from uuv_marl.scenario.documents import File, items, merged, read_toml
+from uuv_marl.scenario.documents import File, merged, read_toml
 from uuv_marl.scenario.hardware import Actuators, Vehicle
 from uuv_marl.scenario.messages import short, shown
 
@@ -43,20 +41,8 @@ def variant_names(vehicle: str) -> list[str]:
 
 
 def show_vehicle(name: str) -> str:
-    """A vehicle's file, with the source of every number, of named variants too. ``name`` as for ``load_vehicle``."""
-    file = vehicle_file(name)
-    document = tomlkit.parse(file.text)
-    if file.variants:
-        changed = variant_comments(file)
-        del document["variants"]
-        for section, fields in file.data.items():
-            table: Any = document[section]
-            for field, value in fields.items():
-                if f"{section}.{field}" in changed:
-                    item = cast(Any, tomlkit).item(value)
-                    table[field] = item.comment(changed[f"{section}.{field}"].lstrip("# "))
-        document["vehicle"]["name"] = file.data["vehicle"]["name"]  # pyright: ignore[reportIndexIssue] - a table
-    return tomlkit.dumps(document).rstrip("\n") + "\n"  # pyright: ignore[reportUnknownMemberType]
+    """A vehicle's file, with its variants and the source of every number. ``name`` as for ``load_vehicle``."""
+    return vehicle_file(name).text
 
 
 def vehicle_file(name: str, beside: Path | None = None) -> File:
@@ -95,18 +81,13 @@ def _variant(file: File, name: str) -> dict[str, Any]:
     variants = cast(dict[str, Any], every) if isinstance(every, dict) else {}
     changes = variants.get(name)
     if changes is None:
-        variants_text = f"it has {', '.join(variants)}" if variants else "it has none"
-        raise ScenarioError(f"vehicle {file.path.stem} has no variant {shown(name)}; {variants_text}")
-    if not isinstance(changes, dict) or not all(
-        isinstance(part, dict) for part in cast(dict[str, Any], changes).values()
-    ):
         raise ScenarioError(
-            f"vehicle {file.path}: variants.{short(name)} must hold tables, such as [variants.{short(name)}.vehicle]"
+            f"vehicle {file.path.stem} has no variant {shown(name)}; it has {', '.join(variants) or 'none'}"
         )
-    other = next((key for key in cast(dict[str, Any], changes) if key not in _FIELDS_BY_SECTION), None)
-    if other is not None:
+    if not isinstance(changes, dict) or not cast(dict[str, Any], changes).keys() <= _FIELDS_BY_SECTION.keys():
         raise ScenarioError(
-            f"vehicle {file.path}: variants.{short(name)} holds {shown(other)}; it may hold only vehicle and actuators"
+            f"vehicle {file.path}: variants.{short(name)} must hold tables, such as [variants.{short(name)}.vehicle], "
+            "of vehicle and actuators only"
         )
     return cast(dict[str, Any], changes)
 
@@ -128,14 +109,3 @@ def _find_vehicle(name: str, beside: Path | None = None) -> Path:
         f"vehicle {shown(name)} is unknown; {hint(name, vehicle_names())}give one of {', '.join(vehicle_names())}, "
         "or a path ending in .toml"
     )
-
-
-def variant_comments(file: "File") -> dict[str, str]:
-    """Comments of the fields that selected variants change, by field."""
-    every = dict(items(tomlkit.parse(file.text)))
-    return {
-        field.removeprefix(f"variants.{name}."): item.trivia.comment
-        for name in file.variants
-        for field, item in every.items()
-        if field.startswith(f"variants.{name}.")
-    }

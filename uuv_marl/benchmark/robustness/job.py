@@ -46,20 +46,13 @@ QUICK = SHIPPED._replace(
 """A first look, in about ten minutes."""
 
 
-class Cell(NamedTuple):
-    """A policy at one level of one axis; ``CALM`` is the axis of level 0."""
-
-    axis: str
-    level: int
-    case: Case
-
-
-def cells(plan: Plan) -> list[Cell]:
-    """All cells of a plan, level 0 of each scenario first."""
+def cells(plan: Plan) -> list[tuple[str, int, Case]]:
+    """Axis, level and case of every cell of a plan, level 0 of each scenario first."""
+    places = [(axis, level) for axis in plan.axes for level in plan.levels if level in AXES[axis].levels]
     return [
-        Cell(axis, level, case_of(scenario, axis, level, policy)._replace(seeds=range(plan.seeds)))
+        (axis, level, case_of(scenario, axis, level, policy)._replace(seeds=range(plan.seeds)))
         for scenario in plan.scenarios
-        for axis, level in _places(plan)
+        for axis, level in [(CALM, 0), *places]
         for policy in plan.policies
         if axis == CALM or AXES[axis].concerns(policy)
     ]  # fmt: skip
@@ -69,12 +62,6 @@ def case_of(scenario: str, axis: str, level: int, policy: str) -> Case:
     """A policy on a scenario at one level of an axis."""
     name = f"{load_scenario(scenario).name}.{axis}.{level}"
     return Case(name, scenario, policy, overrides(axis, level, scenario), shared=True)
-
-
-def _places(plan: Plan) -> Iterator[tuple[str, int]]:
-    yield CALM, 0
-    for axis in plan.axes:
-        yield from ((axis, level) for level in plan.levels if level in AXES[axis].levels)
 
 
 def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> Path:
@@ -100,31 +87,25 @@ def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> P
             levels = ", ".join(map(str, AXES[axis].levels))
             raise ScenarioError(f"axis {axis} has the levels {levels}, and none of them is to be run; give --level")
     planned = cells(plan)
-    for cell in planned:
-        # Raises now, not after hours.
-        make_policy(cell.case.policy, with_policy_requirements(cell.case.policy, cell.case.load()))
+    for _, _, case in planned:
+        make_policy(case.policy, with_policy_requirements(case.policy, case.load()))  # raises now, not after hours
     suite = Suite(folder / "cells", traces=False)
-    suite.run([cell.case for cell in planned], report, restart=restart)
+    suite.run([case for _, _, case in planned], report, restart=restart)
     path = folder / EPISODES
-    write_episodes(path, (row for cell in planned for row in _rows(suite, cell)))
+    rows = [row for cell in planned for row in _rows(suite, *cell)]
+    with replacing(path) as partial:
+        frame = import_pandas("uuv-marl robustness").DataFrame.from_records(rows)
+        frame.to_csv(partial, index=False, float_format=f"%{DIGITS}")
     return path
 
 
-def _rows(suite: Suite, cell: Cell) -> Iterator[dict[str, Any]]:
-    results, seeds = suite.results(cell.case), suite.seeds_of(cell.case)
-    for row in results.select(cell.case.load().name, cell.case.policy, seeds):
+def _rows(suite: Suite, axis: str, level: int, case: Case) -> Iterator[dict[str, Any]]:
+    for row in suite.results(case).select(case.load().name, case.policy, suite.seeds_of(case)):
         metrics: dict[str, Any] = dict(row.metrics)
-        place = {"scenario": row.scenario, "axis": cell.axis, "level": cell.level, "policy": row.policy}
+        place = {"scenario": row.scenario, "axis": axis, "level": level, "policy": row.policy}
         yield {**place, "seed": row.seed, **{name: metrics[name] for name in METRICS}}
 
 
-def write_episodes(path: Path, rows: Iterator[dict[str, Any]]) -> None:
-    """Write rows of scenario, axis, level, policy, seed and metrics as CSV, with six significant digits."""
-    pandas = import_pandas("uuv-marl robustness")
-    with replacing(path) as partial:
-        pandas.DataFrame.from_records(list(rows)).to_csv(partial, index=False, float_format=f"%{DIGITS}")
-
-
 def read_episodes(path: Path) -> Any:
-    """Read the file of ``write_episodes`` as a pandas data frame."""
+    """Read the file of ``run`` as a pandas data frame."""
     return import_pandas("uuv-marl robustness").read_csv(path, dtype={"axis": str, "policy": str, "scenario": str})

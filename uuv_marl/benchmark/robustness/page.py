@@ -1,12 +1,12 @@
 """``robustness.md``: every policy's scores by group and by axis, written from the table of episodes alone."""
 
-from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from string import Template
 from typing import Any
 
 from uuv_marl.atomic import write_text
+from uuv_marl.benchmark.estimates import Estimate
 from uuv_marl.benchmark.robustness.axes import AXES, BASE, CALM, GROUPS
 from uuv_marl.benchmark.robustness.figure import draw
 from uuv_marl.benchmark.robustness.job import EPISODES, read_episodes
@@ -68,9 +68,9 @@ def _scores(table: Any) -> str:
     rows: list[tuple[float, tuple[str, ...]]] = []
     for policy, own in table.groupby(level="policy", sort=False):
         scores = {group: group_score(own, group) for group in _GROUPS}
-        cells = [f"{s:.2f}" if s and g == EVERY else f"{s.value:.2f}" if s else NOTHING for g, s in scores.items()]
+        cells = [f"{score:.2f}" if score and group == EVERY else _text(score) for group, score in scores.items()]
         undisturbed: Any = own[CALM].dropna().to_numpy() if CALM in own else ()
-        calm = f"{scored(undisturbed).value:.2f}" if len(undisturbed) else NOTHING
+        calm = _text(scored(undisturbed) if len(undisturbed) else None)
         best = scores[EVERY] or scores["X"]
         rows.append((best.value if best else -1.0, (policy, f"{len(own)}", calm, *cells)))
     head = ("policy", "seeds", "undisturbed", *(GROUPS.get(group, group) for group in _GROUPS))
@@ -80,12 +80,10 @@ def _scores(table: Any) -> str:
 def _axes(table: Any) -> str:
     """A row for each axis that was run, a column for each policy: the mean success over the levels."""
     policies = dict[str, Any](iter(table.groupby(level="policy", sort=False)))
-    rows = [(name, AXES[name].title, *_successes(policies, name)) for name in AXES]
+    rows = [(name, AXES[name].title, *(_text(axis_score(own, name)) for own in policies.values())) for name in AXES]
     shown = [row for row in rows if any(cell != NOTHING for cell in row[2:])]
     return markdown_table(("axis", "disturbance", *policies), shown)
 
 
-def _successes(policies: dict[str, Any], axis: str) -> Iterator[str]:
-    for own in policies.values():
-        score = axis_score(own, axis)
-        yield f"{score.value:.2f}" if score else NOTHING
+def _text(score: Estimate | None) -> str:
+    return f"{score.value:.2f}" if score else NOTHING

@@ -32,14 +32,9 @@ TEAM_TRAILS = [TRAILS, *(np.rint(WATER + _SHARES * np.subtract(TEAMS[k], WATER))
 
 def palette() -> list[Colour]:
     """Colours of a picture but those of trails, with steps of strong colours towards the water's."""
-    strong = (BLUE, ORANGE, GREEN, PINK, AMBER, TEXT, QUIET, DISC)
-
-    def mixed(colour: Colour, k: int) -> Colour:
-        red, green, blue = (round(c + (w - c) * k / 3) for c, w in zip(colour, WATER, strict=True))
-        return red, green, blue
-
-    faded = [mixed(colour, k) for colour in strong for k in range(3)]
-    return [WHITE, WATER, GRID, PASSIVE, ACTIVE, EDGE, KEEP_OUT, LOST, *faded]
+    strong = np.array((BLUE, ORANGE, GREEN, PINK, AMBER, TEXT, QUIET, DISC))
+    faded = np.rint(strong[:, None] + (np.array(WATER) - strong)[:, None] * (np.arange(3) / 3)[:, None]).astype(int)
+    return [WHITE, WATER, GRID, PASSIVE, ACTIVE, EDGE, KEEP_OUT, LOST, *map(tuple, faded.reshape(-1, 3).tolist())]
 
 
 @functools.cache

@@ -20,7 +20,8 @@ Sign = Callable[[pygame.Surface, float], object]
 WIDE, HIGH = 24, 16
 
 
-def _water(scene: Scene) -> list[tuple[str, Sign]]:
+def signs_of(scene: Scene) -> list[tuple[str, Sign]]:
+    """Words and sign of everything in a scene."""
     limits = scene.scenario.constraints
     teams, all_know = np.unique(scene.groups.team).tolist(), scene.groups.informed.all()
     alone = "vehicle" if all_know else "perceives l(t)"
@@ -28,39 +29,26 @@ def _water(scene: Scene) -> list[tuple[str, Sign]]:
     if not all_know:
         signs.append(("does not perceive l(t)", _all(_dart(ink.BLUE), _dart(ink.WHITE, 7.5))))
     task = scene.scenario.task_class
-    signs.append(
-        (
-            task.reference_label,
-            _all(_circle(ink.GREEN, width=2.0), _circle(ink.GREEN, 2.0)) if scene.followed_paths else _goal,
-        )
-    )
+    moving = _all(_circle(ink.GREEN, width=2.0), _circle(ink.GREEN, 2.0))
+    signs.append((task.reference_label, moving if scene.followed_paths else _goal))
     if len(scene.marks):
         signs.append((task.mark_label or "of the task", _circle(ink.AMBER, width=1.0)))
     if scene.trail.size:
         signs.append((f"last {TRAIL_S:g} s", _trail))
     near = f"nearer than {limits.s_u_m:g} m"
     if scene.obstacles.size:
-        signs.append(
-            (f"obstacle, s_o = {limits.s_o_m:g} m", _all(_circle(ink.KEEP_OUT, width=0.5), _circle(ink.DISC, 5.0)))
-        )
+        disc = _all(_circle(ink.KEEP_OUT, width=0.5), _circle(ink.DISC, 5.0))
+        signs.append((f"obstacle, s_o = {limits.s_o_m:g} m", disc))
         near += "" if limits.s_o_m == limits.s_u_m else f", obstacle {limits.s_o_m:g} m"
     signs += [(near, _dart(ink.AMBER)), ("collision", _all(_cross(ink.ORANGE, 3.0), _circle(ink.ORANGE, width=1.5)))]
     if scene.scenario.loses_vehicles:
         signs.append(("lost", _cross(ink.LOST, 3.5)))
     if scene.water is not None:
         signs.append((f"current, {shown_speed(scene.scenario):g} m/s", _current))
+    if scene.sonar is not None:
+        signs += [("active sonar", _patch(ink.ACTIVE)), ("passive sonar", _patch(ink.PASSIVE)), ("detection", _line)]
+        signs += [("echo", _echo)] if scene.obstacles.size else []
     return signs
-
-
-def _sonar(scene: Scene) -> list[tuple[str, Sign]]:
-    if scene.sonar is None:
-        return []
-    signs = [
-        ("active sonar", _patch(ink.ACTIVE)),
-        ("passive sonar", _patch(ink.PASSIVE)),
-        ("detection", _detection_sign),
-    ]
-    return [*signs, ("echo", _echo)] if scene.obstacles.size else signs
 
 
 def legend_rows(width: int, scene: Scene, height: int) -> int:
@@ -80,19 +68,15 @@ def draw_legend(surface: pygame.Surface, area: pygame.Rect, scene: Scene, height
 
 
 def _flow(width: int, scene: Scene, height: int) -> list[tuple[int, float, str, Sign | None]]:
-    """Row, left end, word and sign.
-
-    The sonar has a row of its own unless one is enough for all; disturbances follow below, as text.
-    """
-    unit, signs = height / 12.0, [*_water(scene), *_sonar(scene)]
-    wide = [(WIDE + 18) * unit + ink.text(words, height).get_width() for words, _ in signs]
-    breaks = {len(_water(scene))} if sum(wide) > width - 8 * unit else set[int]()
-    row, x, flown = 0, 8 * unit, list[tuple[int, float, str, Sign | None]]()
-    for k, (words, sign) in enumerate(signs):
-        if x > 8 * unit and (k in breaks or x + wide[k] > width):
+    """Row, left end, word and sign; disturbances follow below, as text."""
+    unit, row, flown = height / 12.0, 0, list[tuple[int, float, str, Sign | None]]()
+    x = 8 * unit
+    for words, sign in signs_of(scene):
+        wide = (WIDE + 18) * unit + ink.text(words, height).get_width()
+        if x > 8 * unit and x + wide > width:
             row, x = row + 1, 8 * unit
         flown.append((row, x, words, sign))
-        x += wide[k]
+        x += wide
     if disturbances(scene.scenario):
         words = f"disturbances: {conditions(scene.scenario)}"
         flown.append((row + 1, 8 * unit, ink.fitting(words, width - 16 * unit, height, start=True), None))
@@ -141,7 +125,7 @@ def _current(fine: pygame.Surface, unit: float) -> None:
     arrow(fine, np.array([2.0, 8.0]) * unit, np.array([ARROW, 0.0]) * unit, unit)
 
 
-def _detection_sign(fine: pygame.Surface, unit: float) -> None:
+def _line(fine: pygame.Surface, unit: float) -> None:
     pygame.draw.line(fine, ink.PINK, (2.0 * unit, 8.0 * unit), (22.0 * unit, 8.0 * unit), round(unit))
 
 
@@ -152,8 +136,4 @@ def _echo(fine: pygame.Surface, unit: float) -> None:
 
 
 def _patch(colour: ink.Colour) -> Sign:
-    def draw(fine: pygame.Surface, unit: float) -> None:
-        fine.fill(colour)
-        pygame.draw.rect(fine, ink.EDGE, fine.get_rect(), round(unit))
-
-    return draw
+    return lambda fine, unit: (fine.fill(colour), pygame.draw.rect(fine, ink.EDGE, fine.get_rect(), round(unit)))

@@ -102,8 +102,7 @@ class Painter:
                 for at in np.arange(spacing / 2 - passed % spacing, length, spacing):
                     tip = start + max(at, 0.0) * along
                     wings = [tip - 8.0 * unit * (along - side * across) for side in (0.6, -0.6)]
-                    if -20 < tip[0] < view.size[0] + 20 and -20 < tip[1] < view.size[1] + 20:
-                        pygame.draw.polygon(self._fine, colour, [tip.tolist(), *(wing.tolist() for wing in wings)])
+                    pygame.draw.polygon(self._fine, colour, [tip.tolist(), *(wing.tolist() for wing in wings)])
                 passed += length
             pygame.draw.circle(self._fine, ink.WHITE, points[0].tolist(), 5.0 * unit)
             pygame.draw.circle(self._fine, colour, points[0].tolist(), 5.0 * unit, round(1.5 * unit))

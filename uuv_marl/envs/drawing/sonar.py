@@ -9,7 +9,6 @@ from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera
 from uuv_marl.envs.drawing.scene import Float, Scene, SonarView
 from uuv_marl.extras import extra
-from uuv_marl.scenario.hardware import SonarArray
 
 with extra("render", "rendering"):
     import pygame
@@ -20,7 +19,7 @@ def paint_arrays(surface: pygame.Surface, scene: Scene, sonar: SonarView, view: 
     pose, heading = scene.position[sonar.vehicle], scene.heading[sonar.vehicle]
     middle, far = view.pixels(pose).tolist(), 3.0 * math.hypot(*view.reach)
     for array in sorted(scene.scenario.sonar.arrays, key=lambda array: array.kind == "active"):
-        active, bounds = array.kind == "active", edges(array)
+        active, bounds = array.kind == "active", array.bounds_rad
         radius = min(array.range_m, far)
         arc = view.pixels(pose + radius * unit(heading + np.linspace(bounds[0], bounds[-1], 48)))
         pygame.draw.polygon(surface, ink.ACTIVE if active else ink.PASSIVE, [middle, *arc.tolist()])
@@ -35,17 +34,12 @@ def paint_detections(surface: pygame.Surface, scene: Scene, sonar: SonarView, vi
     middle = view.pixels(pose).tolist()
     for place in view.pixels(pose + sonar.neighbour[:, :1] * ahead + sonar.neighbour[:, 1:] * aside).tolist():
         pygame.draw.line(surface, ink.PINK, middle, place, round(1.2 * line_px))
-    active = [edges(array) for array in scene.scenario.sonar.arrays if array.kind == "active"]
+    active = [array.bounds_rad for array in scene.scenario.sonar.arrays if array.kind == "active"]
     sectors = [(low, high) for bounds in active for low, high in pairwise(bounds)]
     for (low, high), radius in zip(sectors, sonar.echo_range, strict=True):
         if radius > 0.0:
             arc = view.pixels(pose + radius * unit(heading + np.linspace(low, high, 8)))
             pygame.draw.lines(surface, ink.PINK, False, arc.tolist(), round(4.0 * line_px))
-
-
-def edges(array: SonarArray) -> Float:
-    """Edges of the sub-sectors, clockwise from the bow [rad], shape (sub-sector + 1,)."""
-    return np.radians(array.mounting_deg + array.aperture_deg * np.linspace(-0.5, 0.5, array.sub_sectors + 1))
 
 
 def unit(angle: float | Float) -> Float:

@@ -21,6 +21,9 @@ _KEYS_PX = 26
 _MOST_FPS = 40
 """Most frames per second; at higher rates some steps are not drawn."""
 _SPEEDS = (0.125, 64.0)
+_FACTORS = dict.fromkeys((pygame.K_PLUS, pygame.K_KP_PLUS, pygame.K_EQUALS), 2.0)
+_FACTORS |= dict.fromkeys((pygame.K_MINUS, pygame.K_KP_MINUS), 0.5)
+"""Change of the speed by each key."""
 
 
 class Window:
@@ -81,17 +84,14 @@ class Window:
             self._paused = not self._paused
         elif event.key == pygame.K_RIGHT:
             self._paused = self._once = True
-        elif event.key in (pygame.K_PLUS, pygame.K_KP_PLUS, pygame.K_EQUALS):
-            self._speed = min(self._speed * 2.0, _SPEEDS[1])
-        elif event.key in (pygame.K_MINUS, pygame.K_KP_MINUS):
-            self._speed = max(self._speed / 2.0, _SPEEDS[0])
+        elif factor := _FACTORS.get(event.key):
+            self._speed = min(max(self._speed * factor, _SPEEDS[0]), _SPEEDS[1])
         elif event.key == pygame.K_c:
             self._camera = CAMERAS[(CAMERAS.index(self._camera) + 1) % len(CAMERAS)]
         elif event.key == pygame.K_TAB:
-            back = bool(getattr(event, "mod", 0) & pygame.KMOD_SHIFT)
-            at = -1 if self._sonar_of is None else self._sonar_of
-            at = (at + 1 + (-1 if back else 1)) % (self._vehicles + 1) - 1
-            self._sonar_of = None if at < 0 else at
+            step = -1 if getattr(event, "mod", 0) & pygame.KMOD_SHIFT else 1
+            choices = [None, *range(self._vehicles)]
+            self._sonar_of = choices[(choices.index(self._sonar_of) + step) % len(choices)]
         return True
 
     def _draw(self, shown: pygame.Surface, scene: Scene) -> None:

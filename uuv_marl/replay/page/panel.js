@@ -73,14 +73,12 @@ export class Panel {
   show(time, selected) {
     const numbers = this.episode.numbers(time);
     NUMBERS.forEach((number, k) => {
-      const isTotal = number.name === "collisions" && numbers.collisions === null;
-      const value = isTotal ? this.episode.metrics.collisions : numbers[number.name];
+      const value = numbers[number.name];
       this.cells[k].textContent = value === null ? "–" : number.unit ? value.toFixed(1) : String(value);
       const bound = this.episode.constraints[number.bound];
       const isBad = value !== null && (number.bound ? value < bound : number.name === "collisions" && value > 0);
       this.cells[k].classList.toggle("below", isBad);
       if (number.unit && value !== null) this.cells[k].append(make("small", {}, number.unit));
-      if (isTotal) this.cells[k].append(make("small", { className: "least" }, "in all"));
       const lowest = numbers[number.lowest];
       if (Number.isFinite(lowest)) this.cells[k].append(make("small", { className: "least" }, `least ${lowest.toFixed(1)}`));
     });
