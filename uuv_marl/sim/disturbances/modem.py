@@ -45,15 +45,10 @@ class Messages(NamedTuple):
     received: Annotated[Float64, "world vehicle peer 3", "Latest message received from each other vehicle, likewise."]
 
 
-def modem(scenario: Scenario) -> ModemModel:
+def modem_model(scenario: Scenario) -> ModemModel:
     """Constants of the scenario's messages for the compiled functions."""
     round_s = scenario.modem.round_s(scenario.swarm.num_vehicles, scenario.latency.sound_speed_mps)
     return ModemModel(round_s, scenario.timing.control_step_s, scenario.modem.loss_probability)
-
-
-def clear_messages(w: int, messages: Messages) -> None:
-    """Clear all messages for world w's new episode."""
-    messages.sent[w], messages.received[w] = -1.0, -1.0
 
 
 @compiled

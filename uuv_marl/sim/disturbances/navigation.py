@@ -39,7 +39,7 @@ class NavigationErrors(NamedTuple):
     bias: Annotated[Float64, "world vehicle 2", "Cosine and sine of its compass's bias, clockwise."]
 
 
-def navigation(scenario: Scenario) -> NavigationModel:
+def navigation_model(scenario: Scenario) -> NavigationModel:
     """Constants of the scenario's navigation for the compiled functions."""
     own = scenario.navigation
     return NavigationModel(own.drift_share, math.radians(own.compass_bias_deg))

@@ -78,7 +78,7 @@ class SensorErrors(NamedTuple):
     ]
 
 
-def noise(scenario: Scenario) -> NoiseModel:
+def noise_model(scenario: Scenario) -> NoiseModel:
     """Constants of the scenario's sonar errors for the compiled functions."""
     settings, arrays = scenario.noise, scenario.sonar.arrays
     half_range = {"active": settings.active_r50_m, "passive": settings.passive_r50_m}
