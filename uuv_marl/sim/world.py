@@ -1,4 +1,4 @@
-"""The step of one world, compiled: motion, losses, distances, arrival, sonar. ``Swarm`` owns the arrays.
+"""The step of a world, compiled: motion, losses, distances, arrival, sonar. ``Swarm`` owns the arrays.
 
 Every array's first axis is the world. Each function accesses one world only, so that results never depend on the others
 in the batch.
@@ -8,7 +8,7 @@ import math
 
 from uuv_marl.sim.arrays import Facts, World, WorldMap
 from uuv_marl.sim.cells import Grid, sort
-from uuv_marl.sim.compiled import compiled_inner
+from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.detection import clear_listener, detect
 from uuv_marl.sim.disturbances import disturbances as disturbing
 from uuv_marl.sim.disturbances.actuation import is_lost_to_fault
@@ -24,8 +24,8 @@ from uuv_marl.sim.traffic import triangle
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import fields
-from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Workspace
-from uuv_marl.types import Float32, Float64
+from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Workspace, WorkspaceBuffers, workspace
+from uuv_marl.types import Bool, Float32, Float64
 
 RUNAWAY = 1000.0
 """A vehicle has diverged if |u| + |v| + |r| [m/s, m/s, rad/s] reaches this. Assumed: a hundred times any real one."""
@@ -217,22 +217,25 @@ def clear_facts(w: int, facts: Facts) -> None:
     facts.saturated[w] = 0.0
 
 
-@compiled_inner
-def observe_world(w: int, world: World, model: Model, workspace: Workspace, disturbances: Disturbances | None) -> None:
+@compiled
+def observe_world(
+    w: int, world: World, model: Model, buffers: WorkspaceBuffers, disturbances: Disturbances | None
+) -> None:
     """Compute facts and percepts of a world after a reset; ``state.dwell`` is written, too."""
+    own = workspace(buffers, 0)
     clear_facts(w, world.facts)
     world.state.dwell[w] = 0
     world.state.collided[w] = False
     world.facts.arrival_s[w] = math.nan
     world.facts.diverged[w] = -1
-    load_state(w, world.state, workspace.now)
-    load_obstacles(w, world.world_map, workspace.obstacles)
-    grid = sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
-    measure_distances(w, world, model, workspace, grid)
+    load_state(w, world.state, own.now)
+    load_obstacles(w, world.world_map, own.obstacles)
+    grid = sort(w, world.state.alive, model.rules.cell_side, own.now, own.cells)
+    measure_distances(w, world, model, own, grid)
     check_arrival(w, world, model.rules)
     for i in range(world.facts.away.shape[1]):
         world.facts.away_before[w, i] = world.facts.away[w, i]
-    perceive(w, world, model, workspace, grid, True)
+    perceive(w, world, model, own, grid, True)
     if disturbances is not None:
         disturbing.begin_disturbances(w, world, disturbances)
         disturbing.take_readings(w, world, model.at, disturbances)
@@ -296,3 +299,20 @@ def step_world(
     facts.saturated[w] /= max(num_alive * control_steps, 1)
     if disturbances is not None:
         disturbing.apply_disturbances(w, world, model.at, disturbances)
+
+
+@compiled
+def step_worlds(
+    thread: int, begin: int, end: int, active: Bool, action: Float32, world: World, model: Model,
+    buffers: WorkspaceBuffers, disturbances: Disturbances | None,
+) -> bool:  # fmt: skip
+    """Advance the active worlds from ``begin`` to ``end`` by one decision period; return whether any has diverged.
+
+    ``active`` has shape (world,), ``action`` (world, vehicle, 2); ``thread`` is the index of the workspace.
+    """
+    own, diverged = workspace(buffers, thread), False
+    for w in range(begin, end):
+        if active[w]:
+            step_world(w, action, world, model, own, disturbances)
+        diverged = diverged or world.facts.diverged[w] >= 0
+    return diverged

@@ -16,10 +16,9 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.disturbance_sections import AROUND_M
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
-from uuv_marl.sim.disturbances.purposes import DIRECTION, EDDY_PLACE, GUST
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.perception import saturate
-from uuv_marl.sim.random import normals, uniform, uniforms
+from uuv_marl.sim.random import DIRECTION, EDDY_PLACE, GUST, normals, uniform, uniforms
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.types import Float64

@@ -17,9 +17,8 @@ from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.disturbances.current import Flow, over_ground
 from uuv_marl.sim.disturbances.navigation import NavigationErrors, by_compass
-from uuv_marl.sim.disturbances.purposes import MESSAGE
 from uuv_marl.sim.perception import saturate
-from uuv_marl.sim.random import uniform
+from uuv_marl.sim.random import MESSAGE, uniform
 from uuv_marl.sim.tables import described
 from uuv_marl.types import Float64
 

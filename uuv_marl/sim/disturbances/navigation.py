@@ -13,9 +13,8 @@ from uuv_marl.percept import MAX_SPEED, Fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
-from uuv_marl.sim.disturbances.purposes import COMPASS, DRIFT
 from uuv_marl.sim.perception import saturate, toward
-from uuv_marl.sim.random import normal, uniform
+from uuv_marl.sim.random import COMPASS, DRIFT, normal, uniform
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.types import Float64
