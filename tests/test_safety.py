@@ -131,7 +131,7 @@ def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
     scenario = with_policy_requirements("bio_inspired,safety_filter=true", load_scenario("starter"))
     policy = make_policy("bio_inspired,zeta_n=0.5,safety_filter=true", scenario, barrier=Barrier(obstacle_m=9.0))
     assert policy.name == "bio_inspired,zeta_n=0.5,safety_filter=true"
-    assert policy.inner.gains.zeta_n == 0.5
+    assert policy.parts["inner"].gains.zeta_n == 0.5
     assert policy.barrier.obstacle_m == 9.0
     with pytest.raises(PolicyError, match="barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"):
         make_policy("bio_inspired,barrier=5,safety_filter=true", scenario)
