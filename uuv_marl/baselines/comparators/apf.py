@@ -10,12 +10,10 @@ is l(t).
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from uuv_marl.baselines.avoidance import obstacle_at
+from uuv_marl.baselines.controller import Controller
 from uuv_marl.baselines.paper.bio_inspired import MIN_DISTANCE_M, counts_once
-from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
-from uuv_marl.baselines.requirements import PolicyRequirements
+from uuv_marl.baselines.policy import Limits, tuned, write_action
 from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -33,27 +31,19 @@ class ApfGains(NamedTuple):
     neighbour_range: float  # rho_0 of neighbours [m]
 
 
-class Apf(Policy):
+class Apf(Controller):
     """Artificial potential field: a well at l(t), hills at neighbours and obstacles, those weighted by l(t)'s distance.
 
     ``tuned_for`` is ``two_swarms``, or "" for the paper's scenarios; ``gains`` replace the tuned ones.
     """
 
-    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
-
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: ApfGains | None = None
     ) -> None:
-        super().__init__(scenario, num_worlds)
-        self.gains = gains or ApfGains(**tuned("apf", tuned_for))
-        self._centres = scenario.sonar.echo_reports == "centre"
+        super().__init__(scenario, num_worlds, gains=gains or ApfGains(**tuned("apf", tuned_for)))
 
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        flat = self.flat(percept)
-        action = np.empty((*flat.shape[:2], 2), np.float32)
-        _act(flat, self.layout.offsets, self.gains, self.limits, self._centres, action, self.clamps)
-        return action
+    def _write(self, percept: Percept, action: Float32) -> None:
+        _act(self.flat(percept), self.layout.offsets, self.gains, self.limits, self._centres, action, self.clamps)
 
 
 @compiled

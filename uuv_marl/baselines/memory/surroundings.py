@@ -43,9 +43,6 @@ def update_memory(
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1] if worlds[w] else 0):
-            memory.counted[w, i, 0] += memory.filtered[w, i, 0]
-            memory.counted[w, i, 1] += memory.filtered[w, i, 1]
-            memory.filtered[w, i, 0] = memory.filtered[w, i, 1] = 0.0
             if is_lost_percept(flat[w, i]):
                 memory.begun[w, i] = 0.0
                 continue

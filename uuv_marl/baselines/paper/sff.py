@@ -8,13 +8,11 @@ splitting term passes obstacles on either side; and the vehicle is pulled to l(t
 import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-import numpy as np
-
 from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
-from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.baselines.controller import Controller
+from uuv_marl.baselines.policy import Limits, write_action
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.percept import Fields, Percept, Starts
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import fields
@@ -54,27 +52,21 @@ class SffMemory(NamedTuple):
     turn: Annotated[Float64, "world vehicle sector 2", "Change of its velocity since then [m/s]."]
 
 
-class Sff(Policy):
+class Sff(Controller):
     """Self-organised fission and fusion, with neighbours' velocities over the link, but not the reference's."""
 
     requirements = PolicyRequirements(("link",), outputs_force=True)
     Memory: ClassVar[type[Any] | None] = SffMemory
-
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SffGains | None = None) -> None:
-        super().__init__(scenario, num_worlds)
-        self.gains = gains or SffGains(**tuned("sff"))
+    Gains = SffGains
+    tuned_as = "sff"
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Compare the detected neighbours with those of the previous decision."""
         period = self.scenario.timing.decision_period_s
         _remember(self.flat(percept), self.at, period, worlds, self.memory)
 
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        flat = self.flat(percept)
-        action = np.empty((*flat.shape[:2], 2), np.float32)
-        _decide(flat, self.at, self.gains, self.limits, self.memory, action)
-        return action
+    def _write(self, percept: Percept, action: Float32) -> None:
+        _decide(self.flat(percept), self.at, self.gains, self.limits, self.memory, action)
 
 
 @compiled

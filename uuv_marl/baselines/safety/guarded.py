@@ -50,7 +50,7 @@ def guard_all(
     worlds: Bool, own: DeadReckoning, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings,
     planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
-    """Replace unsafe actions in place; ``memory.filtered`` records where the filter acts."""
+    """Replace unsafe actions in place."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if not worlds[w] or memory.begun[w, i] == 0.0:
@@ -61,4 +61,3 @@ def guard_all(
                 a_x, a_y = steady_velocity(action[w, i, 0], action[w, i, 1], limits)
                 w_x, w_y = to_map_axes(a_x, a_y, memory.pose[w, i])
                 steer_safely(w, i, w_x, w_y, num, planes, gain, limits, memory, action)
-                memory.filtered[w, i, 0] = 1.0
