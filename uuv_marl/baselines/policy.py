@@ -84,8 +84,7 @@ class Policy:
         check_requirements(self.name, self.requirements, scenario)
         if num_worlds < 1:
             raise PolicyError(f"num_worlds must be at least 1, got {num_worlds}")
-        self.scenario = scenario
-        self.num_worlds = num_worlds
+        self.scenario, self.num_worlds = scenario, num_worlds
         self.layout = PerceptLayout.of(scenario)
         has_link = "link" in scenario.sonar.channels
         self.at = self.layout.offsets if has_link else self.layout.message_offsets
@@ -233,15 +232,11 @@ class Policy:
             PolicyError: the percept is of other worlds, vehicles or fields than the policy was made for.
         """
         rows, expected = percept.flat, (self.num_worlds, self.scenario.swarm.num_vehicles, self.layout.size)
-        if rows.shape != expected or rows.dtype != np.float32:
+        if rows.shape != expected or rows.dtype != np.float32 or percept.layout != self.layout:
             raise PolicyError(
-                f"{self.name} was made for float32 percepts of shape {expected} (world, vehicle, entry), and got "
-                f"{rows.dtype} of shape {rows.shape}; make one for this swarm: make_policy(name, scenario, num_worlds)"
-            )
-        if percept.layout != self.layout:
-            raise PolicyError(
-                f"{self.name} was made for percepts with other fields; make it from the scenario that the swarm was "
-                "made from"
+                f"{self.name} was made for float32 percepts of shape {expected} (world, vehicle, entry) and of its "
+                f"scenario's fields, and got {rows.dtype} of shape {rows.shape}; make one from the scenario and the "
+                "number of worlds of this swarm: make_policy(name, scenario, num_worlds)"
             )
         return np.ascontiguousarray(rows)
 

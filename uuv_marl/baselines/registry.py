@@ -60,23 +60,19 @@ def policy_class(name: str) -> PolicyType:
         trained.checkpoint  # noqa: B018 - raises now, not in the middle of a benchmark
         return trained
     if ":" in plain:
-        return _imported(plain)
+        try:
+            policy_type = named_object(plain)
+        except ImportError as error:
+            raise PolicyError(f"policy {plain!r} {error}") from None
+        if not (isinstance(policy_type, type) and issubclass(policy_type, Policy)):
+            raise PolicyError(f"policy {plain!r} must be a subclass of uuv_marl.baselines.Policy, got {policy_type!r}")
+        return policy_type
     if plain not in POLICIES:
         raise PolicyError(
             f"policy {plain!r} is unknown; {hint(plain, POLICIES)}there are {', '.join(POLICIES)}, module:Class for "
             "your own, and paths of checkpoints"
         )
     return POLICIES[plain]
-
-
-def _imported(name: str) -> type[Policy]:
-    try:
-        policy_type = named_object(name)
-    except ImportError as error:
-        raise PolicyError(f"policy {name!r} {error}") from None
-    if not (isinstance(policy_type, type) and issubclass(policy_type, Policy)):
-        raise PolicyError(f"policy {name!r} must be a subclass of uuv_marl.baselines.Policy, got {policy_type!r}")
-    return policy_type
 
 
 def is_trained(name: str) -> bool:

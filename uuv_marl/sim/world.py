@@ -9,7 +9,7 @@ import math
 from uuv_marl.sim.arrays import Facts, World, WorldMap
 from uuv_marl.sim.cells import Grid, sort
 from uuv_marl.sim.compiled import compiled, compiled_inner
-from uuv_marl.sim.detection import clear_listener, detect
+from uuv_marl.sim.detection import detect
 from uuv_marl.sim.disturbances import disturbances as disturbing
 from uuv_marl.sim.disturbances.actuation import is_lost_to_fault
 from uuv_marl.sim.disturbances.disturbances import Disturbances
@@ -194,7 +194,8 @@ def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Gri
         if detects:
             detect(p, w, world.world_map, model.suite, workspace, grid)
         else:
-            clear_listener(workspace.listener)
+            workspace.listener.detected_index[:] = -1
+            workspace.listener.detected_ahead[:] = workspace.listener.detected_abeam[:] = 0.0
         i = workspace.cells.vehicle[p]
         for k in range(model.suite.lower.shape[0]):
             senses.detected_index[w, i, k] = workspace.listener.detected_index[k]

@@ -12,9 +12,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
+from uuv_marl.baselines.avoidance import bump, pass_obstacle
 from uuv_marl.baselines.controller import Controller
-from uuv_marl.baselines.policy import Limits, write_action
+from uuv_marl.baselines.policy import Limits, surge_resistance, write_action
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Fields, Percept, Starts
@@ -185,7 +185,7 @@ def _force(
         e_x = -c * slots[i, 0] - s * slots[i, 1] - see.reference[w, i, 0]
         e_y = -c * slots[i, 1] + s * slots[i, 0] - see.reference[w, i, 1]
         z_x, z_y, weight = z_x + g.reference * e_x, z_y + g.reference * e_y, weight + g.reference
-    f_x, f_y, clamped = g.drag * own_drag(u, limits), 0.0, 0
+    f_x, f_y, clamped = g.drag * (surge_resistance(abs(u), limits) * u), 0.0, 0
     if weight > 0.0:
         size = math.hypot(z_x, z_y) / weight
         xi = size / rho

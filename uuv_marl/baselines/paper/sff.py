@@ -8,9 +8,9 @@ splitting term passes obstacles on either side; and the vehicle is pulled to l(t
 import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
+from uuv_marl.baselines.avoidance import bump, pass_obstacle
 from uuv_marl.baselines.controller import Controller
-from uuv_marl.baselines.policy import Limits, write_action
+from uuv_marl.baselines.policy import Limits, surge_resistance, write_action
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.sim.compiled import compiled
@@ -89,33 +89,27 @@ def _recall(identity: float, known: Float32) -> int:
 
 @compiled
 def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: SffMemory) -> None:
+    """Update the memory; since the previous decision a vehicle's frame has turned by yaw rate times period."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
-        for i in range(flat.shape[1]):
-            if worlds[w]:
-                _compare(w, i, see, period, memory)
-
-
-@compiled
-def _compare(w: int, i: int, see: Fields, period: float, memory: SffMemory) -> None:
-    """Update one vehicle's memory; since the previous decision its frame has turned by yaw rate times period."""
-    identities, positions, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
-    r = float(see.yaw_rate[w, i, 0])
-    c, s = math.cos(r * period), math.sin(r * period)
-    for k in range(see.detected.shape[2]):
-        old = _recall(see.link_identity[w, i, k], identities)
-        memory.known[w, i, k] = old >= 0
-        if old >= 0:
-            p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
-            v_x, v_y = float(see.link_velocity[w, i, k, 0]), float(see.link_velocity[w, i, k, 1])
-            memory.rate[w, i, k, 0] = (p_x - c * positions[old, 0] - s * positions[old, 1]) / period
-            memory.rate[w, i, k, 1] = (p_y - c * positions[old, 1] + s * positions[old, 0]) / period
-            memory.turn[w, i, k, 0] = v_x - c * moved[old, 0] - s * moved[old, 1]
-            memory.turn[w, i, k, 1] = v_y - c * moved[old, 1] + s * moved[old, 0]
-    for k in range(see.detected.shape[2]):
-        identities[k] = see.link_identity[w, i, k]
-        positions[k, 0], positions[k, 1] = see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1]
-        moved[k, 0], moved[k, 1] = see.link_velocity[w, i, k, 0], see.link_velocity[w, i, k, 1]
+        for i in range(flat.shape[1] if worlds[w] else 0):
+            identities, positions, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
+            r = float(see.yaw_rate[w, i, 0])
+            c, s = math.cos(r * period), math.sin(r * period)
+            for k in range(see.detected.shape[2]):
+                old = _recall(see.link_identity[w, i, k], identities)
+                memory.known[w, i, k] = old >= 0
+                if old >= 0:
+                    p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
+                    v_x, v_y = float(see.link_velocity[w, i, k, 0]), float(see.link_velocity[w, i, k, 1])
+                    memory.rate[w, i, k, 0] = (p_x - c * positions[old, 0] - s * positions[old, 1]) / period
+                    memory.rate[w, i, k, 1] = (p_y - c * positions[old, 1] + s * positions[old, 0]) / period
+                    memory.turn[w, i, k, 0] = v_x - c * moved[old, 0] - s * moved[old, 1]
+                    memory.turn[w, i, k, 1] = v_y - c * moved[old, 1] + s * moved[old, 0]
+            for k in range(see.detected.shape[2]):
+                identities[k] = see.link_identity[w, i, k]
+                positions[k, 0], positions[k, 1] = see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1]
+                moved[k, 0], moved[k, 1] = see.link_velocity[w, i, k, 0], see.link_velocity[w, i, k, 1]
 
 
 @compiled
@@ -133,7 +127,7 @@ def _force(w: int, i: int, see: Fields, g: SffGains, limits: Limits, memory: Sff
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
-    f_x, f_y = pull * l_x + g.drag * own_drag(u, limits), pull * l_y
+    f_x, f_y = pull * l_x + g.drag * (surge_resistance(abs(u), limits) * u), pull * l_y
     mean_x, mean_y, num = 0.0, 0.0, 0
     change, leader_x, leader_y = -1.0, 0.0, 0.0
     for k in range(see.detected.shape[2]):

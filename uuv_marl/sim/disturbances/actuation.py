@@ -124,12 +124,6 @@ def window(key: np.uint64, fault: int, vehicle: int, duration_s: float, scenario
     return first, _NEVER if lasts is None else first + math.ceil(lasts / control_step_s - 1e-9)
 
 
-def hit(tick: Int64, hull: Hull) -> Bool:
-    """Vehicles that a fault has affected before this control step of each world, shape (world, vehicle)."""
-    first, end = hull.broken[..., 0], hull.broken[..., 1]
-    return np.logical_or.reduce((first < end) & (first < tick[:, None, None]), axis=2)
-
-
 @compiled
 def acts(w: int, i: int, fault: int, tick: int, hull: Hull) -> bool:
     """Whether a fault acts on a vehicle in the control step that starts at ``tick``."""

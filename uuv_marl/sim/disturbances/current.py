@@ -76,12 +76,6 @@ class FlowField(NamedTuple):
         return np.array(velocity, np.float64).reshape(points.shape)
 
 
-def flow_field(w: int, core_m: float, flow: Flow) -> FlowField:
-    """Present velocity field of world w."""
-    eddies = flow.eddies[w]
-    return FlowField(flow.mean[w] + flow.gust[w], eddies[eddies[:, 2] != 0.0], core_m)
-
-
 def water(scenario: Scenario) -> WaterModel:
     """Constants of the scenario's current for the compiled functions."""
     current = scenario.current

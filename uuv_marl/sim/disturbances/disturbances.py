@@ -3,6 +3,7 @@
 A world without disturbances has None instead, and its compiled code contains none of this.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -38,7 +39,10 @@ class Disturbances(NamedTuple):
     detections: readings.Detections
     noise_model: noise.NoiseModel
     sensor_errors: noise.SensorErrors
-    navigation_model: navigation.NavigationModel
+    drift_share: float
+    """Error of the estimated position per distance travelled over ground."""
+    compass_bias: float
+    """Standard deviation of a compass's bias [rad]."""
     navigation_errors: navigation.NavigationErrors
     modem_model: modem.ModemModel
     messages: modem.Messages
@@ -68,7 +72,8 @@ def make_disturbances(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]
         detections=allocate(readings.Detections, sizes),
         noise_model=noise.noise_model(scenario),
         sensor_errors=allocate(noise.SensorErrors, sizes),
-        navigation_model=navigation.navigation_model(scenario),
+        drift_share=scenario.navigation.drift_share,
+        compass_bias=math.radians(scenario.navigation.compass_bias_deg),
         navigation_errors=allocate(navigation.NavigationErrors, sizes),
         modem_model=modem.modem_model(scenario),
         messages=allocate(modem.Messages, sizes),
@@ -82,7 +87,7 @@ def sample_disturbances(w: int, scenario: Scenario, world_map: WorldMap, duratio
     current.sample_flow(w, key, np.concatenate(corners), scenario, d.water, d.flow)
     actuation.sample_hulls(w, key, duration_s, scenario, d.hull)
     noise.sample_sensor_errors(w, key, d.noise_model, d.sensor_errors)
-    navigation.sample_navigation_errors(w, key, d.navigation_model, d.navigation_errors)
+    navigation.sample_navigation_errors(w, key, d.compass_bias, d.navigation_errors)
     d.messages.sent[w], d.messages.received[w] = -1.0, -1.0
 
 
@@ -104,7 +109,7 @@ def advance_disturbances(w: int, world: World, d: Disturbances) -> None:
     """Update the disturbances at the end of a control step, which ``state.tick`` already counts."""
     current.advance_gust(w, d.keys[w], world.state.tick[w], d.water, d.flow)
     current.read_flow(w, world.state, d.water, d.flow)
-    navigation.drift_position(w, world.state, d.navigation_model, d.navigation_errors)
+    navigation.drift_position(w, world.state, d.drift_share, d.navigation_errors)
     readings.remember(w, world.state, d.delay_line)
     modem.exchange(w, d.keys[w], world, d.modem_model, d.messages, d.flow, d.navigation_errors)
 
@@ -153,4 +158,5 @@ def apply_disturbances(w: int, world: World, at: Starts, d: Disturbances) -> Non
     noise.write_ranged(w, world.state.alive, d.sonar_timing, d.noise_model, more)
     current.write_velocities(w, world, d.water, d.flow, see, more)
     modem.write_messages(w, world, d.messages, d.navigation_errors, more)
-    navigation.navigate(w, world, d.navigation_model, d.navigation_errors, see)
+    if d.drift_share != 0.0 or d.compass_bias != 0.0:
+        navigation.navigate(w, world, d.navigation_errors, see)
