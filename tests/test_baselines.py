@@ -251,7 +251,7 @@ def test_a_preset_is_a_set_of_numbers_of_which_each_can_still_be_given():
     scenario = with_policy_requirements("scout", load_scenario(STARTER))
     assert make_policy("scout", scenario).gains == make_policy(f"scout,preset={DEFAULT_PRESET}", scenario).gains
     for name, preset in PRESETS.items():
-        policy = make_policy(f"scout,preset={name},push=3.5,safety_filter=true", scenario).inner
+        policy = make_policy(f"scout,preset={name},push=3.5,safety_filter=true", scenario).parts["inner"]
         assert (policy.gains, policy.barrier) == (preset.gains._replace(push=3.5), preset.barrier)
         assert make_policy("scout", scenario, preset=name).gains == preset.gains
 

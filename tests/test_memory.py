@@ -1,6 +1,5 @@
 """What vehicles remember of their surroundings, beside the truth: places, obstacles, neighbours' velocities."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,9 +12,7 @@ from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import age_of
 from uuv_marl.baselines.memory.response import follow, remains
-from uuv_marl.baselines.memory.uncertainty import uncertainty
-from uuv_marl.baselines.scout.controller import uncertain_gains
-from uuv_marl.baselines.scout.gains import ScoutGains
+from uuv_marl.baselines.memory.surroundings import uncertainty
 from uuv_marl.sim.swarm import Swarm
 
 COURSE = {
@@ -249,9 +246,3 @@ def test_vehicles_doubt_where_something_is_not_as_expected(overrides, least, mos
         if k > decisions / 4:
             doubts.append([uncertainty(0, i, policy.memory) for i in range(20)])
     assert least <= np.mean(doubts) <= most
-
-
-def test_who_does_not_doubt_has_the_gains_of_the_law():
-    law = ScoutGains(pull_if_uncertain=-0.3, push_if_uncertain=0.7)
-    assert uncertain_gains(law, 0.0) == law
-    assert uncertain_gains(law, 1.0) == law._replace(pull=law.pull * math.exp(-0.3), push=law.push * math.exp(0.7))

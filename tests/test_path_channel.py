@@ -91,7 +91,7 @@ def test_a_channel_that_the_task_lacks_is_refused_with_the_remedy():
     with pytest.raises(ScenarioError, match="can't hold 'wya' with task 'hard_water', whose channels are .*, path$"):
         load_scenario("hard_water", overrides={"sonar.channels": ["wya"]})
     for name in ("starter", "hard_water"):
-        with pytest.raises(PolicyError, match="Oracle needs the channels path and link"):
+        with pytest.raises(PolicyError, match="oracle needs the channels path and link"):
             make_policy("oracle", load_scenario(name))
 
 

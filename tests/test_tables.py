@@ -9,7 +9,7 @@ from typing_extensions import TypeAliasType
 
 from tests.golden import STARTER
 from uuv_marl import load_scenario
-from uuv_marl.sim import entry_points
+from uuv_marl.sim import world
 from uuv_marl.sim.arrays import Facts, Senses, State, WorldMap
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import Bounds, allocate, array_specs, check
@@ -102,5 +102,5 @@ def test_the_compiled_types_are_the_same_for_all_scenarios():
             swarm = Swarm(scenario, worlds)
             swarm.reset(0)
             swarm.step(np.zeros((worlds, swarm.num_vehicles, 2)))
-    for function in (entry_points.observe, entry_points.step_worlds):
+    for function in (world.observe_world, world.step_worlds):
         assert len(function.signatures) == 2, "one without disturbances, one with them"

@@ -772,6 +772,8 @@ def test_a_network_is_around_a_law_that_ships(law, tmp_path):
     save_checkpoint(tmp_path / WEIGHTS_FILE, card, tensors(card))
     with pytest.raises(PolicyError, match="base_controller must be one of"):
         make_policy(str(tmp_path), load_scenario("starter"))
+    with pytest.raises(PolicyError, match="base_controller must not have safety_filter=true.*set filter=true"):
+        Training(base_controller="scout,safety_filter=true")
 
 
 def test_each_gate_of_a_memory_begins_orthogonal():

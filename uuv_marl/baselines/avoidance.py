@@ -1,8 +1,7 @@
-"""Obstacle terms and drag that several controllers share."""
+"""Obstacle terms that several controllers share."""
 
 import math
 
-from uuv_marl.baselines.policy import Limits, surge_resistance
 from uuv_marl.percept import Fields
 from uuv_marl.sim.compiled import compiled
 
@@ -52,9 +51,3 @@ def pass_obstacle(
     away = repulsion * bump(reach / repulsion_range)
     push = tangential * towards * bump(reach / tangential_range) * side
     return -away * n_x + push * n_y, -away * n_y - push * n_x
-
-
-@compiled
-def own_drag(u: float, limits: Limits) -> float:
-    """Surge resistance [N] at a vehicle's surge velocity [m/s]."""
-    return surge_resistance(abs(u), limits) * u

@@ -9,7 +9,7 @@ from uuv_marl.baselines.env_policy import EnvPolicy, HasSwarm, environment
 from uuv_marl.baselines.learned.checkpoint import Card, is_checkpoint
 from uuv_marl.baselines.learned.residual import ResidualPolicy
 from uuv_marl.baselines.learned.trained import Trained
-from uuv_marl.baselines.names import parse_name
+from uuv_marl.baselines.names import SAFETY_FILTER, parse_name
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.registry import POLICIES, PolicyType, is_trained, policy_class
 from uuv_marl.baselines.requirements import PolicyRequirements, inner_loop_nms, resolved_channels, with_parameters
@@ -120,11 +120,19 @@ def compose(network: Policy, card: Card) -> Policy:
 
 
 def check_base_controller(name: str) -> None:
-    """Raise PolicyError unless the name is a shipped controller's, since checkpoints must not run other code."""
+    """Raise PolicyError unless the name is a shipped controller's, since checkpoints must not run other code.
+
+    Nor may it have a safety filter of its own, which the network's part of an action would bypass.
+    """
     plain = name.partition(",")[0]
     if isinstance(POLICIES.get(plain), Trained) or ":" in plain or is_checkpoint(plain):
         controllers = ", ".join(known for known, type_ in POLICIES.items() if not isinstance(type_, Trained))
         raise PolicyError(f"base_controller must be one of {controllers}, got {name!r}")
+    if parse_name(name).safety_filter:
+        raise PolicyError(
+            f"base_controller must not have {SAFETY_FILTER}=true, got {name!r}; set filter=true, which filters the sum "
+            "of its action and the network's"
+        )
 
 
 def _with_parameters(
@@ -136,7 +144,13 @@ def _with_parameters(
     if isinstance(parameters.get("gains"), str):
         raise PolicyError(f"policy {name!r}: gains are written one by one, such as bio_inspired,zeta_n=0.5")
     values = {key: _value(value) for key, value in parameters.items()}
-    policy: Any = constructor(scenario, num_worlds, **{key: values.pop(key) for key in known if key in values})
+    own = {key: values.pop(key) for key in known if key in values}
+    if isinstance(policy_type, Trained):
+        policy: Any = constructor(scenario, num_worlds, **own)
+    else:
+        policy = object.__new__(policy_type)
+        policy.name = name  # for the constructor's messages
+        policy.__init__(scenario, num_worlds, **own)
     if values:
         gains: Any = getattr(policy, "gains", None)
         replaced = {key: _gain(name, key, value, gains, known) for key, value in values.items()}

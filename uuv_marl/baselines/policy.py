@@ -55,8 +55,8 @@ class Policy:
     - A policy with a memory declares its arrays in ``Memory`` and updates them in ``remember(percept, worlds)``;
       ``decide`` reads ``self.memory``. The base class allocates, clears, saves and restores them.
     - ``act`` runs ``update_memory``, ``decide`` and ``drive`` (to the actuators), in this order.
-    - A safety filter is a policy with an inner policy: its ``decide`` calls ``update_memory`` and ``decide`` of the
-      inner policy and changes the result. ``record_action`` reports actions that replace those of ``act``.
+    - A safety filter is a policy with an inner policy, one of its ``parts``: its ``decide`` changes what
+      ``decide_part`` returns. ``record_action`` reports actions that replace those of ``act``.
 
     Args:
         scenario: gives the vehicle's limits, the decision period and the percept's layout.
@@ -73,6 +73,8 @@ class Policy:
     """Lengths of further axes of ``Memory``."""
     requirements: PolicyRequirements = PolicyRequirements()
     """Requirements beyond the percept: channels, inner loop, decision period."""
+    parts: Mapping[str, "Policy"] = {}
+    """Policies within this one, by name: reset, saved and restored with it."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
         self.name: str = getattr(self, "name", type(self).__name__)
@@ -82,8 +84,7 @@ class Policy:
         check_requirements(self.name, self.requirements, scenario)
         if num_worlds < 1:
             raise PolicyError(f"num_worlds must be at least 1, got {num_worlds}")
-        self.scenario = scenario
-        self.num_worlds = num_worlds
+        self.scenario, self.num_worlds = scenario, num_worlds
         self.layout = PerceptLayout.of(scenario)
         has_link = "link" in scenario.sonar.channels
         self.at = self.layout.offsets if has_link else self.layout.message_offsets
@@ -118,6 +119,8 @@ class Policy:
         world_seeds(seed, chosen)  # raises for an invalid seed
         self.clamps[chosen] = 0
         self._forget(chosen)
+        for part in self.parts.values():
+            part.reset(seed, worlds)
 
     def _forget(self, worlds: list[int] | Bool) -> None:
         """Clear the memory of these worlds."""
@@ -170,6 +173,16 @@ class Policy:
         """Store the actions taken, if ``Memory`` has an array for them; for actions that replace those of ``act``."""
         if "action" in getattr(self.Memory, "_fields", ()):
             self.memory.action[self.active] = action[self.active]
+        for part in self.parts.values():
+            part.record_action(action)
+
+    @final
+    def decide_part(self, name: str, percept: Percept) -> Float32:
+        """Output of a part's ``decide``, after an update of its memory."""
+        part = self.parts[name]
+        part.active = self.active
+        part.update_memory(percept)
+        return part.decide(percept)
 
     def _advance(self, clock: Clock | None) -> Bool:
         """Clear the memory of worlds that were reset; a mask of the worlds whose time has advanced, shape (world,)."""
@@ -194,7 +207,7 @@ class Policy:
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """A copy of all state that later decisions depend on, for ``restore``."""
-        return {name: array.copy() for name, array in self._arrays().items()}
+        return {name: array.copy() for name, array in self._arrays().items()} | parts_of(**self.parts)
 
     def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
         """Continue from a snapshot of the same policy. Raises PolicyError for missing or differently shaped arrays."""
@@ -205,6 +218,8 @@ class Policy:
                 raise PolicyError(f"the snapshot's {name} must be {array.dtype} of shape {array.shape}, got {got}")
         for name, array in self._arrays().items():
             array[...] = snapshot[name]
+        for name, part in self.parts.items():
+            part.restore(part_of(snapshot, name))
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         memory: dict[str, NDArray[Any]] = self.memory._asdict() if self.Memory else {}
@@ -217,15 +232,11 @@ class Policy:
             PolicyError: the percept is of other worlds, vehicles or fields than the policy was made for.
         """
         rows, expected = percept.flat, (self.num_worlds, self.scenario.swarm.num_vehicles, self.layout.size)
-        if rows.shape != expected or rows.dtype != np.float32:
+        if rows.shape != expected or rows.dtype != np.float32 or percept.layout != self.layout:
             raise PolicyError(
-                f"{self.name} was made for float32 percepts of shape {expected} (world, vehicle, entry), and got "
-                f"{rows.dtype} of shape {rows.shape}; make one for this swarm: make_policy(name, scenario, num_worlds)"
-            )
-        if percept.layout != self.layout:
-            raise PolicyError(
-                f"{self.name} was made for percepts with other fields; make it from the scenario that the swarm was "
-                "made from"
+                f"{self.name} was made for float32 percepts of shape {expected} (world, vehicle, entry) and of its "
+                f"scenario's fields, and got {rows.dtype} of shape {rows.shape}; make one from the scenario and the "
+                "number of worlds of this swarm: make_policy(name, scenario, num_worlds)"
             )
         return np.ascontiguousarray(rows)
 

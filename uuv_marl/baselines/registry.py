@@ -2,24 +2,16 @@
 
 import re
 
+from uuv_marl.baselines import random_idle
 from uuv_marl.baselines.bug.controller import TangentBug
-from uuv_marl.baselines.comparators.apf import Apf
-from uuv_marl.baselines.comparators.leader_follower import LeaderFollower
-from uuv_marl.baselines.comparators.olfati_saber import OlfatiSaber, OlfatiSaberInformed
-from uuv_marl.baselines.comparators.oracle import Oracle
-from uuv_marl.baselines.comparators.orca import OrcaInformed
-from uuv_marl.baselines.comparators.proportional import ProportionalTracking
+from uuv_marl.baselines.comparators import apf, leader_follower, olfati_saber, oracle, orca, proportional
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
 from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.names import parse_name
-from uuv_marl.baselines.paper.bio_inspired import BioInspired, BioInspiredPlus
-from uuv_marl.baselines.paper.sdc import Sdc
-from uuv_marl.baselines.paper.sff import Sff
+from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.policy import Policy, PolicyError
-from uuv_marl.baselines.random_idle import Idle, Random
-from uuv_marl.baselines.scout.carrot import Carrot, CarrotInformed
+from uuv_marl.baselines.scout import carrot, seeker
 from uuv_marl.baselines.scout.controller import Scout
-from uuv_marl.baselines.scout.seeker import NearestTarget
 from uuv_marl.errors import hint
 from uuv_marl.modules import named_object
 
@@ -37,25 +29,25 @@ _NETWORKS = {
 """Docstrings of the networks in ``uuv_marl/baselines/weights``."""
 
 POLICIES: dict[str, PolicyType] = {
-    "bio_inspired": BioInspired,
-    "bio_inspired_plus": BioInspiredPlus,
+    "bio_inspired": bio_inspired.BioInspired,
+    "bio_inspired_plus": bio_inspired.BioInspiredPlus,
     "scout": Scout,
-    "carrot": Carrot,
-    "carrot_informed": CarrotInformed,
-    "nearest_target": NearestTarget,
-    "sff": Sff,
-    "sdc": Sdc,
-    "apf": Apf,
-    "olfati_saber": OlfatiSaber,
-    "olfati_saber_informed": OlfatiSaberInformed,
-    "orca_informed": OrcaInformed,
-    "leader_follower": LeaderFollower,
-    "proportional_tracking": ProportionalTracking,
-    "oracle": Oracle,
+    "carrot": carrot.Carrot,
+    "carrot_informed": carrot.CarrotInformed,
+    "nearest_target": seeker.NearestTarget,
+    "sff": sff.Sff,
+    "sdc": sdc.Sdc,
+    "apf": apf.Apf,
+    "olfati_saber": olfati_saber.OlfatiSaber,
+    "olfati_saber_informed": olfati_saber.OlfatiSaberInformed,
+    "orca_informed": orca.OrcaInformed,
+    "leader_follower": leader_follower.LeaderFollower,
+    "proportional_tracking": proportional.ProportionalTracking,
+    "oracle": oracle.Oracle,
     "tangent_bug": TangentBug,
     **{name: Trained(name, name, doc) for name, doc in _NETWORKS.items()},
-    "random": Random,
-    "idle": Idle,
+    "random": random_idle.Random,
+    "idle": random_idle.Idle,
 }
 """Every policy that ships with the package."""
 
@@ -68,23 +60,19 @@ def policy_class(name: str) -> PolicyType:
         trained.checkpoint  # noqa: B018 - raises now, not in the middle of a benchmark
         return trained
     if ":" in plain:
-        return _imported(plain)
+        try:
+            policy_type = named_object(plain)
+        except ImportError as error:
+            raise PolicyError(f"policy {plain!r} {error}") from None
+        if not (isinstance(policy_type, type) and issubclass(policy_type, Policy)):
+            raise PolicyError(f"policy {plain!r} must be a subclass of uuv_marl.baselines.Policy, got {policy_type!r}")
+        return policy_type
     if plain not in POLICIES:
         raise PolicyError(
             f"policy {plain!r} is unknown; {hint(plain, POLICIES)}there are {', '.join(POLICIES)}, module:Class for "
             "your own, and paths of checkpoints"
         )
     return POLICIES[plain]
-
-
-def _imported(name: str) -> type[Policy]:
-    try:
-        policy_type = named_object(name)
-    except ImportError as error:
-        raise PolicyError(f"policy {name!r} {error}") from None
-    if not (isinstance(policy_type, type) and issubclass(policy_type, Policy)):
-        raise PolicyError(f"policy {name!r} must be a subclass of uuv_marl.baselines.Policy, got {policy_type!r}")
-    return policy_type
 
 
 def is_trained(name: str) -> bool:

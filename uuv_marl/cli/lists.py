@@ -24,8 +24,8 @@ def show_list(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Print the file of this scenario or vehicle, such as lauv, with all sources; after policies, what this "
-            "policy does and its parameters.",
+            help="Print the file of this scenario or vehicle, such as lauv, with all sources; after policies, what "
+            "this policy does and its parameters.",
         ),
     ] = None,
 ) -> None:

@@ -19,7 +19,7 @@
 ``x``, ``y``, ``c``, ``s``  North and east [m]; cosine and sine of the heading. ``pose`` holds the four.
 ``*_x``, ``*_y``            Components of a vector: north and east, or ahead and to starboard.
 ``hull``                    Each vehicle's own parameters and faults (``disturbances.actuation.Hull``).
-``disturbances``, ``d``     ``disturbances.disturbances.Disturbances``, or None; its parts ``water``, ``noise``, ...
+``disturbances``, ``d``     ``disturbances.disturbances.Disturbances``, or None; its parts ``water``, ``noise_model``,
                             are constants, ``flow``, ``errors``, ``readings``, ... are arrays.
 ``at``                      Start of each field in a percept; in a reading, the reading (``schedule.Reading``).
 ==========================  =========================================================================================

@@ -118,14 +118,6 @@ def gather(box: Box, cells: Cells, grid: Grid, listener: Listener) -> int:
 
 
 @compiled_inline
-def clear_listener(listener: Listener) -> None:
-    """Clear the listener's detections."""
-    listener.detected_index[:] = -1
-    listener.detected_ahead[:] = 0.0
-    listener.detected_abeam[:] = 0.0
-
-
-@compiled_inline
 def detect(p: int, w: int, world_map: WorldMap, suite: SonarSuite, workspace: Workspace, grid: Grid) -> None:
     """Detect vehicles for entry p: around it, then farther out where a sub-sector is empty. Eq. 8-9, 12-15."""
     cells, listener, sectors = workspace.cells, workspace.listener, suite.lower.shape[0]

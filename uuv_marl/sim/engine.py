@@ -10,10 +10,10 @@ from uuv_marl.sim.arrays import World
 from uuv_marl.sim.cells import max_cells
 from uuv_marl.sim.compiled import entry
 from uuv_marl.sim.disturbances.disturbances import Disturbances
-from uuv_marl.sim.entry_points import observe, step_worlds
 from uuv_marl.sim.model import model
 from uuv_marl.sim.threads import num_threads, on_threads
 from uuv_marl.sim.workspace import workspace_buffers
+from uuv_marl.sim.world import observe_world, step_worlds
 from uuv_marl.types import Bool, Float32
 
 _LEAST = 200
@@ -40,7 +40,7 @@ class Engine:
 
     @functools.cached_property
     def _observe(self) -> Callable[..., None]:
-        return entry(observe, 0, *self._numbers)
+        return entry(observe_world, 0, *self._numbers)
 
     @functools.cached_property
     def _step(self) -> Callable[..., bool]:

@@ -34,10 +34,10 @@ class EpisodeSetup(NamedTuple):
 
 def default_setup(scenario: Scenario, rng: np.random.Generator) -> EpisodeSetup:
     """Sample one trajectory for all vehicles, the scenario's or a random one, and the start behind its first point."""
-    field = sample_field(scenario, rng)
-    eta, nu = start_state(scenario, field.waypoints, rng)
-    n, times = scenario.swarm.num_vehicles, arrival_times(field.waypoints, scenario.trajectory.speed_mps)
+    waypoints, obstacles = sample_field(scenario, rng)
+    eta, nu = start_state(scenario, waypoints, rng)
+    n, times = scenario.swarm.num_vehicles, arrival_times(waypoints, scenario.trajectory.speed_mps)
     return EpisodeSetup(
-        (field.waypoints,), (times,), field.obstacles, eta, nu,
+        (waypoints,), (times,), obstacles, eta, nu,
         group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_), duration_s=float(times[-1]),
     )  # fmt: skip

@@ -1,7 +1,6 @@
 """Trajectory and obstacles of a world: the scenario's own, or a random field sampled by the world's generator."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,20 +12,13 @@ from uuv_marl.types import Float64
 _TRIES_PER_OBSTACLE = 32
 
 
-class Field(NamedTuple):
-    """Waypoints (point, 2) [m] and obstacles (obstacle, 3): centre north, east and radius [m]."""
-
-    waypoints: Float64
-    obstacles: Float64
-
-
-def sample_field(scenario: Scenario, rng: np.random.Generator) -> Field:
-    """Sample trajectory and obstacles of a world."""
+def sample_field(scenario: Scenario, rng: np.random.Generator) -> tuple[Float64, Float64]:
+    """Sample waypoints (point, 2) [m] and obstacles (obstacle, 3): centre north, east and radius [m]."""
     if scenario.random_field is None:
         obstacles = [(*obstacle.centre_m, obstacle.radius_m) for obstacle in scenario.obstacles]
-        return Field(np.array(scenario.trajectory.waypoints_m), np.array(obstacles, np.float64).reshape(-1, 3))
+        return np.array(scenario.trajectory.waypoints_m), np.array(obstacles, np.float64).reshape(-1, 3)
     waypoints = _polyline(scenario.random_field, rng)
-    return Field(waypoints, _obstacles(scenario, scenario.random_field, waypoints, rng))
+    return waypoints, _obstacles(scenario, scenario.random_field, waypoints, rng)
 
 
 def longest_duration(scenario: Scenario) -> float:

@@ -25,8 +25,8 @@ def load_obstacles(w: int, world_map: WorldMap, buffers: ObstacleBuffers) -> Non
     """Load the columns of world w's obstacles, choose all of them, and forget which are nearby."""
     obstacles = obstacle_columns(buffers)
     obstacles.num_nearby[: world_map.group.shape[1]] = -1
+    load_places(w, world_map, buffers)
     for k in range(world_map.num_obstacles[w]):
-        obstacles.x[k], obstacles.y[k] = world_map.obstacles[w, k, 0], world_map.obstacles[w, k, 1]
         obstacles.radius[k], obstacles.chosen[k] = world_map.obstacles[w, k, 2], k
 
 

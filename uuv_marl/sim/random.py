@@ -29,6 +29,14 @@ _L1, _L2, _L3 = 6.666666666666735130e-01, 3.999999999940941908e-01, 2.8571428743
 _L4, _L5 = 2.222219843214978396e-01, 1.818357216161805012e-01
 _L6, _L7 = 1.531383769920937332e-01, 1.479819860511658591e-01
 
+DIRECTION, GUST, EDDY_PLACE = 1, 2, 3
+MISMATCH, VICTIM, ONSET = 10, 11, 12
+BEARING_RANGE, FACTOR, DETECTION, SILENCE, FALSE_ECHO, FALSE_PLACE = 20, 21, 22, 23, 24, 25
+DRIFT, COMPASS = 30, 31
+MESSAGE = 40
+MOVER, MOVER_DIRECTION = 50, 51
+"""Purposes of an episode's random numbers, one for each draw."""
+
 
 def episode_key(stream: np.random.Generator) -> np.uint64:
     """Key of the episode that a reset samples from this generator: a hash of its state before."""
@@ -52,7 +60,7 @@ def uniforms(key: np.uint64, purpose: int, time: int, vehicle: int, slot: int) -
 
     Args:
         key: key of the episode (``Swarm.keys``).
-        purpose: constant of ``uuv_marl.sim.disturbances.purposes``.
+        purpose: one of the constants above.
         time: control step, reading or decision, below 2^32.
         vehicle: index of the vehicle.
         slot: index among the vehicle's pairs at this time.

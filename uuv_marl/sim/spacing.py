@@ -107,7 +107,10 @@ def measure_obstacles(
         nearest, others = nearest_surface(i, x, y, obstacles)
         if nearest >= hull_radius and others > nearest:
             facts.clearance[w, i] = min(facts.clearance[w, i], nearest)
-            lower_squares(num, x, y, obstacles)
+            for k in range(num):
+                dx, dy = obstacles.x[k] - x, obstacles.y[k] - y
+                squared = dx * dx + dy * dy
+                obstacles.squared[k] = squared if squared < obstacles.squared[k] else obstacles.squared[k]
         else:
             began += meet_obstacles(w, i, x, y, hull_radius, world, obstacles)
     for k in range(num):
@@ -118,15 +121,6 @@ def measure_obstacles(
     for k in range(num, obstacles_before.shape[1]):
         obstacles_before[w, k, 0], obstacles_before[w, k, 1], obstacles_before[w, k, 2] = NOWHERE
     return began
-
-
-@compiled_inline
-def lower_squares(num: int, x: float, y: float, obstacles: Obstacles) -> None:
-    """Lower ``obstacles.squared`` of the first ``num`` by their squared distance from a vehicle at (x, y)."""
-    for k in range(num):
-        dx, dy = obstacles.x[k] - x, obstacles.y[k] - y
-        squared = dx * dx + dy * dy
-        obstacles.squared[k] = squared if squared < obstacles.squared[k] else obstacles.squared[k]
 
 
 @compiled_inline

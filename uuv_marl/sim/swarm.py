@@ -11,8 +11,7 @@ from uuv_marl.percept import Clock, Percept, PerceptLayout, task_fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, action_array, whole_number, world_seeds
 from uuv_marl.sim.arrays import Facts, Senses, State, World, WorldMap
-from uuv_marl.sim.disturbances.actuation import hit
-from uuv_marl.sim.disturbances.current import Flow, FlowField, flow_field
+from uuv_marl.sim.disturbances.current import Flow, FlowField
 from uuv_marl.sim.disturbances.disturbances import disturbance_tables, make_disturbances, sample_disturbances
 from uuv_marl.sim.engine import Engine
 from uuv_marl.sim.episode_setup import EpisodeSetup
@@ -22,7 +21,7 @@ from uuv_marl.sim.spacing import NOWHERE
 from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
 from uuv_marl.sim.traffic import sample_traffic
-from uuv_marl.types import Bool, Float64, Int32
+from uuv_marl.types import Bool, Float64
 
 _log = logging.getLogger("uuv_marl")
 
@@ -47,7 +46,8 @@ class Swarm:
         """Fields of the percept that the task writes."""
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
         self._ready, self._warned = np.zeros(num_worlds, np.bool_), np.zeros(num_worlds, np.bool_)
-        self._duration_s = np.zeros(num_worlds)
+        self.duration_s = np.zeros(num_worlds)
+        """Duration of l(t) up to its end [s], the least task time; shape (world,)."""
         self.keys = np.zeros(num_worlds, np.uint64)
         """Key of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
         self._seeds = np.zeros(num_worlds, np.uint64)
@@ -55,6 +55,9 @@ class Swarm:
         self._sizes = _sizes(scenario, num_worlds, self.layout.size) | kind.sizes(scenario)
         self.state, self.world_map = allocate(State, self._sizes), allocate(WorldMap, self._sizes)
         self.facts, self._senses = allocate(Facts, self._sizes), allocate(Senses, self._sizes)
+        self.detected_index, self.heading = self._senses.detected_index, self._senses.heading
+        """Index of the vehicle detected in each sub-sector, -1 for none, shape (world, vehicle, sector); cosine and
+        sine of every vehicle's heading psi, shape (world, vehicle, 2)."""
         self._world = World(self.state, self.world_map, self.facts, self._senses)
         self.facts.arrival_s[:], self.facts.diverged[:] = np.nan, -1
         self._disturbances = make_disturbances(scenario, self.keys, self._sizes)
@@ -68,16 +71,6 @@ class Swarm:
         """Present percepts of all vehicles, shape (world, vehicle, ...)."""
         clock = Clock(self.facts.time_s, self.keys, self._seeds)
         return Percept(self._senses.percept, self.layout, clock, self.state.alive)
-
-    @property
-    def detected_index(self) -> Int32:
-        """Index of the vehicle detected in each sub-sector, -1 for none, shape (world, vehicle, sector)."""
-        return self._senses.detected_index
-
-    @property
-    def heading(self) -> Float64:
-        """Cosine and sine of every vehicle's heading psi, shape (world, vehicle, 2)."""
-        return self._senses.heading
 
     @property
     def own_reference(self) -> Float64:
@@ -107,7 +100,10 @@ class Swarm:
         """Present velocity field of a world's water, as in ``swarm.flow_field().at([[100.0, 200.0]])``."""
         if self._disturbances is None:
             return FlowField(np.zeros(2), np.zeros((0, 3)), self.scenario.current.eddy_core_m)
-        return flow_field(world, self._disturbances.water.core, self._disturbances.flow)
+        flow, eddies = self._disturbances.flow, self._disturbances.flow.eddies[world]
+        return FlowField(
+            flow.mean[world] + flow.gust[world], eddies[eddies[:, 2] != 0.0], self._disturbances.water.core
+        )
 
     @property
     def velocity(self) -> Float64:
@@ -127,11 +123,6 @@ class Swarm:
         return np.stack([c * x - s * y, c * y + s * x], axis=-1)
 
     @property
-    def duration_s(self) -> Float64:
-        """Duration of l(t) up to its end [s], the least task time; shape (world,)."""
-        return self._duration_s
-
-    @property
     def time_limit_s(self) -> Float64:
         """Time at which an episode is truncated [s], shape (world,)."""
         return self.scenario.time_limit.of(self.duration_s)
@@ -139,8 +130,10 @@ class Swarm:
     @property
     def faulty(self) -> Bool:
         """Vehicles that a fault of the scenario has affected since the reset, shape (world, vehicle)."""
-        own = self._disturbances
-        return np.zeros_like(self.state.alive) if own is None else hit(self.state.tick, own.hull)
+        if self._disturbances is None:
+            return np.zeros_like(self.state.alive)
+        first, end = np.moveaxis(self._disturbances.hull.broken, -1, 0)
+        return ((first < end) & (first < self.state.tick[:, None, None])).any(axis=2)
 
     @property
     def arrived(self) -> Bool:
@@ -206,7 +199,7 @@ class Swarm:
             world_map.times[w, g, :points], world_map.times[w, g, points:] = times, times[-1]
             world_map.last[w, g] = points - 1
         world_map.group[w], world_map.informed[w] = setup.group, setup.informed
-        self._duration_s[w] = setup.duration_s
+        self.duration_s[w] = setup.duration_s
         world_map.obstacles[w, :m], world_map.obstacles[w, m:] = setup.obstacles, 0.0
         world_map.num_obstacles[w] = m
         sample_traffic(w, self.keys[w], self.scenario, world_map)
@@ -265,7 +258,7 @@ class Swarm:
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         return {
-            "duration_s": self._duration_s,
+            "duration_s": self.duration_s,
             "keys": self.keys,
             "seeds": self._seeds,
             **{name: array for table in self._tables() for name, array in table._asdict().items()},

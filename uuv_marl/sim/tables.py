@@ -22,10 +22,6 @@ class Bounds(NamedTuple):
     axis: str = ""
     beyond: int = 0
 
-    def high(self, sizes: Mapping[str, int]) -> float:
-        """Largest value allowed, with axes of these lengths."""
-        return sizes[self.axis] - 1 + self.beyond if self.axis else float(np.finfo(np.float64).max)
-
 
 class ArraySpec(NamedTuple):
     """Declaration of one array of a table."""
@@ -75,6 +71,7 @@ def check(table: type[Any], arrays: Mapping[str, NDArray[Any]], sizes: Mapping[s
     for name, spec in array_specs(table).items():
         if spec.bounds is None:
             continue
-        low, high = spec.bounds.low, spec.bounds.high(sizes)
+        low, axis, beyond = spec.bounds
+        high = sizes[axis] - 1 + beyond if axis else float(np.finfo(np.float64).max)
         if not ((arrays[name] >= low) & (arrays[name] <= high)).all():
             raise ValueError(f"{name} must lie within {low} and {high}, got {np.unique(arrays[name])[[0, -1]]}")

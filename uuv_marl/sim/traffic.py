@@ -10,8 +10,7 @@ import numpy as np
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import WorldMap
 from uuv_marl.sim.compiled import compiled_inline
-from uuv_marl.sim.disturbances.purposes import MOVER, MOVER_DIRECTION
-from uuv_marl.sim.random import uniform
+from uuv_marl.sim.random import MOVER, MOVER_DIRECTION, uniform
 from uuv_marl.sim.trigonometry import cos_sin
 
 _LONG = 2**31

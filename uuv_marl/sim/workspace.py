@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner, from_source
 from uuv_marl.sim.tables import array_specs
@@ -108,20 +109,11 @@ class Workspace(NamedTuple):
 TABLES = (Columns, Cells, Listener, Obstacles)
 
 
-class WorkspaceBuffers(NamedTuple):
-    """The arrays of all threads: one for each axis and type, since each that is passed from Python costs time."""
+WorkspaceBuffers = tuple[NDArray[Any], ...]
+"""The arrays of all threads, shape (thread, column, axis): one for each axis and type, since each that is passed from
+Python costs time."""
 
-    reals: Annotated[Float64, "thread column vehicle", ""]
-    integers: Annotated[Int64, "thread column vehicle", ""]
-    shorts: Annotated[Int32, "thread column vehicle", ""]
-    sector_reals: Annotated[Float64, "thread column sector", ""]
-    sector_integers: Annotated[Int64, "thread column sector", ""]
-    cell_integers: Annotated[Int64, "thread column cell", ""]
-    obstacle_reals: Annotated[Float64, "thread column obstacle", ""]
-    nearby_integers: Annotated[Int64, "thread column nearby", ""]
-
-
-_KINDS = Counter((spec.axes[0], spec.dtype) for table in TABLES for spec in array_specs(table).values())
+_COLUMNS = Counter((spec.axes[0], spec.dtype) for table in TABLES for spec in array_specs(table).values())
 """How many columns there are of each axis and type."""
 
 
@@ -132,19 +124,17 @@ def workspace_buffers(
     lengths = {"vehicle": num_vehicles + 16, "sector": num_sectors + 9, "cell": num_cells + 9}
     lengths["obstacle"] = max(num_obstacles, num_vehicles) + 9
     lengths["nearby"] = max(num_obstacles, MOST_NEARBY * num_vehicles) + 9
-    arrays: Any = (
-        np.zeros((threads, _KINDS[spec.axes[-1], spec.dtype], lengths[spec.axes[-1]]), spec.dtype)
-        for spec in array_specs(WorkspaceBuffers).values()
-    )
-    return WorkspaceBuffers(*arrays)
+    return tuple(np.zeros((threads, num, lengths[axis]), dtype) for (axis, dtype), num in _COLUMNS.items())
+
+
+_REALS, _INTEGERS = ("obstacle", np.float64), ("nearby", np.int64)
+"""Axis and type of the columns of obstacles."""
 
 
 def _sources() -> Iterator[str]:
     """Source that makes each table from ``buffers`` of thread t; obstacles are made from ``ObstacleBuffers``."""
-    buffers = {
-        (spec.axes[-1], spec.dtype): f"buffers.{name}[t, " for name, spec in array_specs(WorkspaceBuffers).items()
-    }
-    buffers |= {("obstacle", np.float64): "buffers.reals[", ("nearby", np.int64): "buffers.integers["}
+    buffers = {kind: f"buffers[{k}][t, " for k, kind in enumerate(_COLUMNS)}
+    buffers |= {_REALS: "buffers.reals[", _INTEGERS: "buffers.integers["}
     taken: Counter[object] = Counter()
     for table in TABLES:
         columns: list[str] = []
@@ -156,7 +146,8 @@ def _sources() -> Iterator[str]:
 
 
 *_OWN, _OBSTACLES = _sources()
-_THREADS = f"Workspace({', '.join(_OWN)}, ObstacleBuffers(buffers.obstacle_reals[t], buffers.nearby_integers[t]))"
+_NEARBY = ", ".join(f"buffers[{[*_COLUMNS].index(kind)}][t]" for kind in (_REALS, _INTEGERS))
+_THREADS = f"Workspace({', '.join(_OWN)}, ObstacleBuffers({_NEARBY}))"
 workspace: Callable[[WorkspaceBuffers, int], Workspace] = compiled_inner(
     from_source("workspace", "buffers, t", _THREADS, globals())
 )

@@ -1,4 +1,4 @@
-"""The step of one world, compiled: motion, losses, distances, arrival, sonar. ``Swarm`` owns the arrays.
+"""The step of a world, compiled: motion, losses, distances, arrival, sonar. ``Swarm`` owns the arrays.
 
 Every array's first axis is the world. Each function accesses one world only, so that results never depend on the others
 in the batch.
@@ -8,18 +8,12 @@ import math
 
 from uuv_marl.sim.arrays import Facts, World, WorldMap
 from uuv_marl.sim.cells import Grid, sort
-from uuv_marl.sim.compiled import compiled_inner
-from uuv_marl.sim.detection import clear_listener, detect
+from uuv_marl.sim.compiled import compiled, compiled_inner
+from uuv_marl.sim.detection import detect
+from uuv_marl.sim.disturbances import disturbances as disturbing
 from uuv_marl.sim.disturbances.actuation import is_lost_to_fault
-from uuv_marl.sim.disturbances.disturbances import (
-    Disturbances,
-    advance_disturbances,
-    apply_disturbances,
-    begin_disturbances,
-    integrate_disturbed,
-    reads,
-    take_readings,
-)  # fmt: skip
+from uuv_marl.sim.disturbances.disturbances import Disturbances
+from uuv_marl.sim.disturbances.readings import any_due
 from uuv_marl.sim.model import Model, Rules
 from uuv_marl.sim.motion import apply_actuators, integrate, load_action, load_one, load_state
 from uuv_marl.sim.nearby import load_obstacles, load_places, remember_nearby
@@ -29,9 +23,9 @@ from uuv_marl.sim.stopping import stop_hulls
 from uuv_marl.sim.traffic import triangle
 from uuv_marl.sim.trajectory import reference
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.views import disturbance_fields, fields
-from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Workspace
-from uuv_marl.types import Float32, Float64
+from uuv_marl.sim.views import fields
+from uuv_marl.sim.workspace import MOST_NEARBY, Columns, Workspace, WorkspaceBuffers, workspace
+from uuv_marl.types import Bool, Float32, Float64
 
 RUNAWAY = 1000.0
 """A vehicle has diverged if |u| + |v| + |r| [m/s, m/s, rad/s] reaches this. Assumed: a hundred times any real one."""
@@ -51,7 +45,7 @@ def integrate_control_step(
     if disturbances is None:
         integrate(rules.steps, rules.step_s, now, model.plant)
     else:
-        integrate_disturbed(w, state, rules, now, disturbances)
+        disturbing.integrate_disturbed(w, state, rules, now, disturbances)
     for i in range(state.eta.shape[1]):
         state.before[w, i, 0], state.before[w, i, 1] = state.eta[w, i, 0], state.eta[w, i, 1]
         if not state.alive[w, i]:
@@ -73,7 +67,7 @@ def apply_losses(w: int, world: World, rules: Rules, disturbances: Disturbances 
     """Lose the vehicles with a loss scheduled now, and those lost to faults."""
     if disturbances is not None:
         for i in range(world.state.alive.shape[1]):
-            if is_lost_to_fault(w, i, world.state.tick[w], disturbances.actuation, disturbances.hull):
+            if is_lost_to_fault(w, i, world.state.tick[w], disturbances.actuation_model, disturbances.hull):
                 lose_vehicle(w, i, world)
     for k in range(rules.loss_ticks.shape[0]):
         if rules.loss_ticks[k] == world.state.tick[w]:
@@ -200,7 +194,8 @@ def perceive(w: int, world: World, model: Model, workspace: Workspace, grid: Gri
         if detects:
             detect(p, w, world.world_map, model.suite, workspace, grid)
         else:
-            clear_listener(workspace.listener)
+            workspace.listener.detected_index[:] = -1
+            workspace.listener.detected_ahead[:] = workspace.listener.detected_abeam[:] = 0.0
         i = workspace.cells.vehicle[p]
         for k in range(model.suite.lower.shape[0]):
             senses.detected_index[w, i, k] = workspace.listener.detected_index[k]
@@ -223,29 +218,29 @@ def clear_facts(w: int, facts: Facts) -> None:
     facts.saturated[w] = 0.0
 
 
-@compiled_inner
-def observe_world(w: int, world: World, model: Model, workspace: Workspace, disturbances: Disturbances | None) -> None:
+@compiled
+def observe_world(
+    w: int, world: World, model: Model, buffers: WorkspaceBuffers, disturbances: Disturbances | None
+) -> None:
     """Compute facts and percepts of a world after a reset; ``state.dwell`` is written, too."""
+    own = workspace(buffers, 0)
     clear_facts(w, world.facts)
     world.state.dwell[w] = 0
     world.state.collided[w] = False
     world.facts.arrival_s[w] = math.nan
     world.facts.diverged[w] = -1
-    load_state(w, world.state, workspace.now)
-    load_obstacles(w, world.world_map, workspace.obstacles)
-    grid = sort(w, world.state.alive, model.rules.cell_side, workspace.now, workspace.cells)
-    measure_distances(w, world, model, workspace, grid)
+    load_state(w, world.state, own.now)
+    load_obstacles(w, world.world_map, own.obstacles)
+    grid = sort(w, world.state.alive, model.rules.cell_side, own.now, own.cells)
+    measure_distances(w, world, model, own, grid)
     check_arrival(w, world, model.rules)
     for i in range(world.facts.away.shape[1]):
         world.facts.away_before[w, i] = world.facts.away[w, i]
-    perceive(w, world, model, workspace, grid, True)
+    perceive(w, world, model, own, grid, True)
     if disturbances is not None:
-        begin_disturbances(w, world, disturbances)
-        take_readings(w, world, disturbances, fields(world.senses.percept, model.at))
-        apply_disturbances(
-            w, world, disturbances, fields(world.senses.percept, model.at),
-            disturbance_fields(world.senses.percept, model.at),
-        )  # fmt: skip
+        disturbing.begin_disturbances(w, world, disturbances)
+        disturbing.take_readings(w, world, model.at, disturbances)
+        disturbing.apply_disturbances(w, world, model.at, disturbances)
 
 
 @compiled_inner
@@ -294,15 +289,31 @@ def step_world(
     for control_step_index in range(control_steps):
         grid = control_step(w, control_step_index == 0, world, model, workspace, disturbances)
         if disturbances is not None:
-            advance_disturbances(w, world, disturbances)
-        due = disturbances is not None and reads(w, world.state.tick[w], disturbances)
+            disturbing.advance_disturbances(w, world, disturbances)
+        due = disturbances is not None and any_due(
+            w, world.state.tick[w], disturbances.sonar_timing, disturbances.delay_line
+        )
         if due or control_step_index == control_steps - 1:
             perceive(w, world, model, workspace, grid, due or disturbances is None or disturbances.sonar_timing.ideal)
             if disturbances is not None:
-                take_readings(w, world, disturbances, fields(world.senses.percept, model.at))
+                disturbing.take_readings(w, world, model.at, disturbances)
     facts.saturated[w] /= max(num_alive * control_steps, 1)
     if disturbances is not None:
-        apply_disturbances(
-            w, world, disturbances, fields(world.senses.percept, model.at),
-            disturbance_fields(world.senses.percept, model.at),
-        )  # fmt: skip
+        disturbing.apply_disturbances(w, world, model.at, disturbances)
+
+
+@compiled
+def step_worlds(
+    thread: int, begin: int, end: int, active: Bool, action: Float32, world: World, model: Model,
+    buffers: WorkspaceBuffers, disturbances: Disturbances | None,
+) -> bool:  # fmt: skip
+    """Advance the active worlds from ``begin`` to ``end`` by one decision period; return whether any has diverged.
+
+    ``active`` has shape (world,), ``action`` (world, vehicle, 2); ``thread`` is the index of the workspace.
+    """
+    own, diverged = workspace(buffers, thread), False
+    for w in range(begin, end):
+        if active[w]:
+            step_world(w, action, world, model, own, disturbances)
+        diverged = diverged or world.facts.diverged[w] >= 0
+    return diverged

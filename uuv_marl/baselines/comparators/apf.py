@@ -10,13 +10,11 @@ is l(t).
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from uuv_marl.baselines.avoidance import obstacle_at
+from uuv_marl.baselines.controller import Controller
 from uuv_marl.baselines.paper.bio_inspired import MIN_DISTANCE_M, counts_once
-from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
-from uuv_marl.baselines.requirements import PolicyRequirements
-from uuv_marl.percept import Fields, Percept, Starts
+from uuv_marl.baselines.policy import Limits, tuned, write_action
+from uuv_marl.percept import Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
@@ -33,27 +31,19 @@ class ApfGains(NamedTuple):
     neighbour_range: float  # rho_0 of neighbours [m]
 
 
-class Apf(Policy):
+class Apf(Controller):
     """Artificial potential field: a well at l(t), hills at neighbours and obstacles, those weighted by l(t)'s distance.
 
     ``tuned_for`` is ``two_swarms``, or "" for the paper's scenarios; ``gains`` replace the tuned ones.
     """
 
-    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
-
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: ApfGains | None = None
     ) -> None:
-        super().__init__(scenario, num_worlds)
-        self.gains = gains or ApfGains(**tuned("apf", tuned_for))
-        self._centres = scenario.sonar.echo_reports == "centre"
+        super().__init__(scenario, num_worlds, gains=gains or ApfGains(**tuned("apf", tuned_for)))
 
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        flat = self.flat(percept)
-        action = np.empty((*flat.shape[:2], 2), np.float32)
-        _act(flat, self.layout.offsets, self.gains, self.limits, self._centres, action, self.clamps)
-        return action
+    def _write(self, percept: Percept, action: Float32) -> None:
+        _act(self.flat(percept), self.layout.offsets, self.gains, self.limits, self._centres, action, self.clamps)
 
 
 @compiled
@@ -91,23 +81,17 @@ def _act(flat: Float32, at: Starts, g: ApfGains, limits: Limits, centres: bool, 
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
-            f_x, f_y, bound = _force(w, i, see, g, centres)
-            clamps[w] += bound
+            l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
+            f_x, f_y = g.attraction * l_x, g.attraction * l_y
+            for k in range(see.detected.shape[2]):
+                if see.detected[w, i, k] > 0.0:
+                    d_x, d_y, bound = apf_neighbour_force(see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1], g)
+                    f_x, f_y = f_x + d_x, f_y + d_y
+                    clamps[w] += bound
+            for a in range(see.echo.shape[2]):
+                if see.echo[w, i, a] > 0.0 and counts_once(w, i, a, see, centres):
+                    n_x, n_y, reach, _ = obstacle_at(w, i, a, see, centres)
+                    d_x, d_y, bound = apf_obstacle_force(n_x, n_y, reach, l_x, l_y, g)
+                    f_x, f_y = f_x + d_x, f_y + d_y
+                    clamps[w] += bound
             write_action(f_x, f_y, limits, action[w, i])
-
-
-@compiled
-def _force(w: int, i: int, see: Fields, g: ApfGains, centres: bool) -> tuple[float, float, int]:
-    """Body-frame force on one vehicle [N], forward and to starboard, and the number of active bounds."""
-    l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
-    f_x, f_y, bound = g.attraction * l_x, g.attraction * l_y, 0
-    for k in range(see.detected.shape[2]):
-        if see.detected[w, i, k] > 0.0:
-            d_x, d_y, c = apf_neighbour_force(see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1], g)
-            f_x, f_y, bound = f_x + d_x, f_y + d_y, bound + c
-    for a in range(see.echo.shape[2]):
-        if see.echo[w, i, a] > 0.0 and counts_once(w, i, a, see, centres):
-            n_x, n_y, reach, _ = obstacle_at(w, i, a, see, centres)
-            d_x, d_y, c = apf_obstacle_force(n_x, n_y, reach, l_x, l_y, g)
-            f_x, f_y, bound = f_x + d_x, f_y + d_y, bound + c
-    return f_x, f_y, bound

@@ -73,31 +73,23 @@ class LeaderFollower(Filtered):
         return action
 
 
-class NeighbourSummary(NamedTuple):
-    """Mean velocity [m/s] of a vehicle's neighbours, and mean position from it [m], in its map."""
-
-    v_x: float
-    v_y: float
-    x: float
-    y: float
+Others = tuple[float, float, float, float]
+"""Mean velocity [m/s] of a vehicle's neighbours, and mean position from it [m], in its map."""
 
 
 @compiled
-def remembered(w: int, i: int, g: LeaderFollowerGains, memory: Surroundings) -> NeighbourSummary:
-    """Summary of the neighbours in a vehicle's memory."""
+def remembered(w: int, i: int, g: LeaderFollowerGains, memory: Surroundings) -> Others:
+    """Means of the neighbours in a vehicle's memory."""
     v_x, v_y, weights, x, y, num = 0.0, 0.0, 1e-9, 0.0, 0.0, 0
     for k in range(memory.known.shape[2]):
         if memory.known[w, i, k] > 0.0:
-            x, y = (
-                x + memory.place[w, i, k, 0] - memory.pose[w, i, 0],
-                y + memory.place[w, i, k, 1] - memory.pose[w, i, 1],
-            )
-            num += 1
+            x, num = x + memory.place[w, i, k, 0] - memory.pose[w, i, 0], num + 1
+            y = y + memory.place[w, i, k, 1] - memory.pose[w, i, 1]
             if memory.known[w, i, k] >= g.sightings:
                 weight = math.exp(-memory.away[w, i, k] / g.near)
                 v_x, v_y = v_x + weight * memory.velocity[w, i, k, 0], v_y + weight * memory.velocity[w, i, k, 1]
                 weights += weight
-    return NeighbourSummary(v_x / weights, v_y / weights, x / max(num, 1), y / max(num, 1))
+    return v_x / weights, v_y / weights, x / max(num, 1), y / max(num, 1)
 
 
 @compiled
@@ -108,22 +100,21 @@ def at_most(x: float, y: float, length: float) -> tuple[float, float]:
 
 
 @compiled
-def _following(others: NeighbourSummary, g: LeaderFollowerGains) -> tuple[float, float]:
+def _following(others: Others, g: LeaderFollowerGains) -> tuple[float, float]:
     """Desired velocity of a follower [m/s]."""
-    w_x, w_y = at_most(g.follow * others.v_x, g.follow * others.v_y, g.cruise)
-    g_x, g_y = at_most(g.gather * others.x, g.gather * others.y, g.gather_mps)
+    v_x, v_y, x, y = others
+    w_x, w_y = at_most(g.follow * v_x, g.follow * v_y, g.cruise)
+    g_x, g_y = at_most(g.gather * x, g.gather * y, g.gather_mps)
     return w_x + g_x, w_y + g_y
 
 
 @compiled
-def _leading(
-    w: int, i: int, others: NeighbourSummary, g: LeaderFollowerGains, memory: Surroundings
-) -> tuple[float, float]:
+def _leading(w: int, i: int, others: Others, g: LeaderFollowerGains, memory: Surroundings) -> tuple[float, float]:
     """Desired velocity of a leader [m/s]."""
     at, speed = memory.reference[w, i], memory.reference_speed[w, i]
     to_x, to_y = at[0] - memory.pose[w, i, 0], at[1] - memory.pose[w, i, 1]
     w_x, w_y = at_most(speed * at[2] + g.pull * to_x, speed * at[3] + g.pull * to_y, g.speed)
-    ahead = -(others.x * to_x + others.y * to_y) / max(math.hypot(to_x, to_y), 1e-6)
+    ahead = -(others[2] * to_x + others[3] * to_y) / max(math.hypot(to_x, to_y), 1e-6)
     share = min(max(1.0 - (ahead - g.ahead) / max(g.stop - g.ahead, 1e-6), _BACK), 1.0)
     return share * w_x, share * w_y
 

@@ -12,16 +12,13 @@ alignment that is the extension by Su, Wang and Lin, Flocking of multi-agents wi
 """
 
 import math
-from typing import ClassVar, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from uuv_marl.baselines.avoidance import bump, obstacle_at
+from uuv_marl.baselines.controller import Controller
 from uuv_marl.baselines.paper.bio_inspired import counts_once
-from uuv_marl.baselines.policy import Limits, Policy, surge_resistance, tuned, write_action
-from uuv_marl.baselines.requirements import PolicyRequirements
+from uuv_marl.baselines.policy import Limits, surge_resistance, write_action
 from uuv_marl.percept import Fields, Percept, Starts
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32
@@ -48,30 +45,21 @@ class OlfatiSaberGains(NamedTuple):
     alignment: float = 0.0  # damping towards each neighbour's velocity (c_2 of alpha) [N s/m]; 0 without ``link``
 
 
-class OlfatiSaber(Policy):
+class OlfatiSaber(Controller):
     """Olfati-Saber's flocking without alignment: lattice, obstacles and navigation, from positions alone."""
 
-    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
-    tuned_as: ClassVar[str] = "olfati_saber"
+    Gains = OlfatiSaberGains
+    tuned_as = "olfati_saber"
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: OlfatiSaberGains | None = None) -> None:
-        super().__init__(scenario, num_worlds)
-        self.gains = gains or OlfatiSaberGains(**tuned(self.tuned_as))
-        self._centres = scenario.sonar.echo_reports == "centre"
-
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        flat = self.flat(percept)
-        action = np.empty((*flat.shape[:2], 2), np.float32)
-        _act(flat, self.at, self.gains, self.limits, self._centres, action)
-        return action
+    def _write(self, percept: Percept, action: Float32) -> None:
+        _act(self.flat(percept), self.at, self.gains, self.limits, self._centres, action)
 
 
 class OlfatiSaberInformed(OlfatiSaber):
     """``OlfatiSaber`` with alignment: every vehicle also follows its neighbours' velocities."""
 
     requirements = OlfatiSaber.requirements._replace(channels=("link",))
-    tuned_as: ClassVar[str] = "olfati_saber_informed"
+    tuned_as = "olfati_saber_informed"
 
 
 @compiled

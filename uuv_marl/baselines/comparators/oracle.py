@@ -1,4 +1,4 @@
-"""``oracle``: knows the map of ``hard_water`` and follows a shortest path; shows that every map can be passed.
+"""``oracle``: follows the given path of a task with the channel ``path``; shows that every map can be passed.
 
 Its desired velocity leads to a point ahead on the given path (the channel ``path``), and off near neighbours. It takes
 the nearest velocity that approaches no wall and no neighbour too fast. Of two neighbours, the one nearer to that point
@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.baselines.policy import Limits, Policy
+from uuv_marl.baselines.controller import Controller
+from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
 from uuv_marl.percept import Fields, Percept, Starts
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Float64
@@ -37,25 +37,18 @@ class OracleGains(NamedTuple):
     push_range: float = 9.0  # distance at which both end [m]
 
 
-class Oracle(Policy):
-    """Knows the map of hard_water and follows a shortest path: shows that each map can be passed."""
+class Oracle(Controller):
+    """Follows the shortest path that the task knows: shows that each map can be passed."""
 
     requirements = PolicyRequirements(("path", "link"), yaw_damping_nms=600.0, outputs_force=True)
+    Gains = OracleGains
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: OracleGains | None = None) -> None:
-        super().__init__(scenario, num_worlds)
-        self.gains = gains or OracleGains()
-        self._gain = velocity_gain(scenario)
-
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        flat = self.flat(percept)
+    def _write(self, percept: Percept, action: Float32) -> None:
+        flat, gain = self.flat(percept), velocity_gain(self.scenario)
         path, walls = percept["path"], percept["path_walls"]
         length = percept["path_length"] * (percept["right_of_way"] if "right_of_way" in self.layout.starts else 1.0)
         planes = np.zeros((walls.shape[2] + self.scenario.sonar.num_sectors, 3))
-        action = np.empty((*flat.shape[:2], 2), np.float32)
-        _act(flat, self.at, path, length, walls, self.gains, self.limits, self._gain, planes, action)
-        return action
+        _act(flat, self.at, path, length, walls, self.gains, self.limits, gain, planes, action)
 
 
 @compiled

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from uuv_marl.baselines.avoidance import obstacle_at
+from uuv_marl.baselines.controller import Controller
 from uuv_marl.baselines.paper.bio_inspired import counts_once
-from uuv_marl.baselines.policy import Limits, Policy, tuned
+from uuv_marl.baselines.policy import Limits, tuned
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
@@ -36,7 +37,7 @@ class OrcaGains(NamedTuple):
     pull: float  # desired velocity per distance to l(t), added to the reference's velocity [1/s]
 
 
-class OrcaInformed(Policy):
+class OrcaInformed(Controller):
     """Reciprocal velocity obstacles: half-planes of velocity from neighbours' velocities and from echoes.
 
     ``tuned_for`` is ``two_swarms``, or "" for the paper's scenarios; ``gains`` replace the tuned ones.
@@ -47,23 +48,12 @@ class OrcaInformed(Policy):
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: OrcaGains | None = None
     ) -> None:
-        super().__init__(scenario, num_worlds)
-        self.gains = gains or OrcaGains(**tuned("orca_informed", tuned_for))
-        self._speed = full_speed(self.limits)
-        self._follow = velocity_gain(scenario)
-        self._centres = scenario.sonar.echo_reports == "centre"
+        super().__init__(scenario, num_worlds, gains=gains or OrcaGains(**tuned("orca_informed", tuned_for)))
         self._planes: Float64 = np.zeros((scenario.sonar.num_sectors + scenario.sonar.num_active_sectors, 3))
 
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        flat = self.flat(percept)
-        action = np.empty((*flat.shape[:2], 2), np.float32)
-        period = self.scenario.timing.decision_period_s
-        _act(
-            flat, self.at, self.gains, self.limits, self._speed, self._follow, period, self._centres,
-            self._planes, action,
-        )  # fmt: skip
-        return action
+    def _write(self, percept: Percept, action: Float32) -> None:
+        flat, period, gain = self.flat(percept), self.scenario.timing.decision_period_s, velocity_gain(self.scenario)
+        _act(flat, self.at, self.gains, self.limits, gain, period, self._centres, self._planes, action)
 
 
 @compiled
@@ -109,11 +99,11 @@ def _add(planes: Float64, num: int, u: float, v: float, demand: tuple[float, flo
 
 @compiled
 def _act(
-    flat: Float32, at: Starts, g: OrcaGains, limits: Limits, speed: float, follow: float, period: float, centres: bool,
-    planes: Float64, action: Float32,
+    flat: Float32, at: Starts, g: OrcaGains, limits: Limits, gain: float, period: float, centres: bool, planes: Float64,
+    action: Float32,
 ) -> None:  # fmt: skip
-    """Write every vehicle's action. ``speed`` is its largest [m/s]; ``follow`` is from ``velocity_gain`` [N s/m]."""
-    see = fields(flat, at)
+    """Write every vehicle's action."""
+    see, speed = fields(flat, at), full_speed(limits)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1]):
             u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
@@ -123,7 +113,7 @@ def _act(
             w_y = float(see.reference_velocity[w, i, 1]) + g.pull * float(see.reference[w, i, 1])
             far = max(math.hypot(w_x, w_y) / speed, 1.0)
             w_x, w_y, _ = nearest_velocity(w_x / far, w_y / far, planes, num, firm, speed)
-            steer(w_x, w_y, u, v, follow, limits, action[w, i])
+            steer(w_x, w_y, u, v, gain, limits, action[w, i])
 
 
 @compiled

@@ -2,13 +2,10 @@
 
 from typing import NamedTuple
 
-import numpy as np
-
-from uuv_marl.baselines.policy import Limits, Policy
-from uuv_marl.baselines.requirements import PolicyRequirements
+from uuv_marl.baselines.controller import Controller
+from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.steering import steer, velocity_gain
 from uuv_marl.percept import Percept, Starts
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32
@@ -20,22 +17,14 @@ class ProportionalGains(NamedTuple):
     pull: float = 0.05  # to l(t) [1/s]; as that of ``scout``
 
 
-class ProportionalTracking(Policy):
+class ProportionalTracking(Controller):
     """The velocity of l(t) and a pull to l(t), without regard to neighbours and obstacles."""
 
-    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
+    Gains = ProportionalGains
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: ProportionalGains | None = None) -> None:
-        super().__init__(scenario, num_worlds)
-        self.gains = gains or ProportionalGains()
-        self._gain = velocity_gain(scenario)
-
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        flat = self.flat(percept)
-        action = np.empty((*flat.shape[:2], 2), np.float32)
-        _act(flat, self.layout.offsets, self.gains, self.limits, self._gain, action)
-        return action
+    def _write(self, percept: Percept, action: Float32) -> None:
+        gain = velocity_gain(self.scenario)
+        _act(self.flat(percept), self.layout.offsets, self.gains, self.limits, gain, action)
 
 
 @compiled

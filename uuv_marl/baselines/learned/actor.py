@@ -1,7 +1,7 @@
 """``Actor``: a policy whose network maps observations as closeness to actions, in NumPy, with or without a memory."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -23,7 +23,7 @@ class Remembered(NamedTuple):
 
 
 class Actor(Policy):
-    """A checkpoint's network without memory, from a vehicle's percept to its action. Deterministic.
+    """A checkpoint's network, with or without memory, from a vehicle's percept to its action. Deterministic.
 
     Raises PolicyError if percept, decision period or inner loop differ from the training's, or the vehicle, unless
     ``any_vehicle``.
@@ -34,24 +34,28 @@ class Actor(Policy):
     ) -> None:
         self.name, self.checkpoint, card = name, checkpoint, checkpoint.card
         self.requirements = card.requirements
-        self.axes = {"unit": card.network.hidden[-1]}
+        if card.network.memory:
+            cast(Any, self).Memory, self.axes = Remembered, {"unit": card.network.hidden[-1]}
         super().__init__(scenario, num_worlds)
         check_same_training(self, card, any_vehicle)
         self._seeing = observation_layout(scenario, "closeness")
         self._network = Network(card.network, card.sizes, checkpoint.tensors, NumpyOps)
 
+    def remember(self, percept: Percept, worlds: Bool) -> None:
+        """Update the recurrent layer's state with the latest observation."""
+        z, state = self._features(percept, worlds), self.memory.state
+        before = state[worlds].reshape(-1, state.shape[2])
+        state[worlds] = self._network.step(self._network.gates(z), before).reshape(state[worlds].shape)
+
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         z = self._features(percept, self.active)
-        action = self._network.output(z, self._recalled())
+        state = self.memory.state[self.active].reshape(len(z), -1) if self.Memory else None
+        action = self._network.output(z, state)
         bound(action, in_disc(self))
         whole = np.zeros((*percept.flat.shape[:2], 2), np.float32)
         whole[self.active] = action.reshape(-1, *whole.shape[1:])
         return whole
-
-    def _recalled(self) -> Float32 | None:
-        """State of the recurrent layer in active worlds, shape (row, unit)."""
-        return None
 
     def _features(self, percept: Percept, worlds: Bool) -> Float32:
         """Features of the vehicles of these worlds, shape (row, entry)."""
@@ -60,21 +64,6 @@ class Actor(Policy):
         observation, observe = observer(chosen, self._seeing)
         observe(0, len(observation))
         return self._network.features(observation.reshape(-1, self._seeing.size))
-
-
-class Recurrent(Actor):
-    """A checkpoint's network with a memory; arguments as for ``Actor``."""
-
-    Memory: ClassVar[type[Any] | None] = Remembered
-
-    def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Update the recurrent layer's state with the latest observation."""
-        z, state = self._features(percept, worlds), self.memory.state
-        before = state[worlds].reshape(-1, state.shape[2])
-        state[worlds] = self._network.step(self._network.gates(z), before).reshape(state[worlds].shape)
-
-    def _recalled(self) -> Float32:
-        return self.memory.state[self.active].reshape(-1, self.axes["unit"])
 
 
 @compiled

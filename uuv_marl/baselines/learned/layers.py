@@ -1,5 +1,6 @@
 """The networks of learned policies, written once: NumPy, torch and ONNX run the same code, each with its operations."""
 
+import functools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
@@ -126,10 +127,14 @@ class Network:
 
 
 class NumpyOps:
-    """Operations on arrays. A row's result does not depend on other rows, which no BLAS library guarantees."""
+    """Operations on arrays: some columns, columns side by side, the sum over the middle axis, thirds of the columns ...
 
-    tanh = staticmethod(np.tanh)
-    shaped = staticmethod(np.reshape)
+    A row's result does not depend on other rows, which no BLAS library guarantees.
+    """
+
+    tanh, shaped = staticmethod(np.tanh), staticmethod(np.reshape)
+    take, joined, total = (functools.partial(of, axis=1) for of in (np.take, np.concatenate, np.sum))
+    parts = functools.partial(np.split, indices_or_sections=3, axis=1)
 
     @staticmethod
     def dense(x: Float32, weight: Float32, bias: Float32 | None = None) -> Float32:
@@ -137,21 +142,6 @@ class NumpyOps:
         out: Float32 = np.empty((len(x), weight.shape[1]), np.float32)
         dense(x, weight, np.zeros_like(weight[0]) if bias is None else bias, out)
         return out
-
-    @staticmethod
-    def take(x: Float32, columns: Int64) -> Float32:
-        """Some columns."""
-        return x[:, columns]
-
-    @staticmethod
-    def joined(parts: Sequence[Float32]) -> Float32:
-        """Columns side by side."""
-        return np.concatenate(parts, axis=1)
-
-    @staticmethod
-    def parts(x: Float32) -> list[Float32]:
-        """Thirds of the columns."""
-        return np.split(x, 3, axis=1)
 
     @staticmethod
     def sigmoid(x: Float32) -> Float32:
@@ -162,11 +152,6 @@ class NumpyOps:
     def relu(x: Float32) -> Float32:
         """Rectifier."""
         return np.maximum(x, np.float32(0.0))
-
-    @staticmethod
-    def total(x: Float32) -> Float32:
-        """Sum over the middle axis."""
-        return x.sum(axis=1)
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 import functools
 
-from uuv_marl.baselines.learned.actor import Actor, Recurrent
+from uuv_marl.baselines.learned.actor import Actor
 from uuv_marl.baselines.learned.checkpoint import Checkpoint, load_checkpoint
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.paths import UserPath
@@ -30,5 +30,4 @@ class Trained:
 
     def __call__(self, scenario: Scenario, num_worlds: int = 1, *, any_vehicle: bool = False) -> Actor:
         """The network for a scenario, without safety filter or base controller. Raises PolicyError as ``Actor``."""
-        network = Recurrent if self.checkpoint.card.network.memory else Actor
-        return network(scenario, num_worlds, name=self.name, checkpoint=self.checkpoint, any_vehicle=any_vehicle)
+        return Actor(scenario, num_worlds, name=self.name, checkpoint=self.checkpoint, any_vehicle=any_vehicle)

@@ -7,7 +7,7 @@ remains undetected where it should be detected is removed.
 import math
 from typing import NamedTuple
 
-from uuv_marl.baselines.memory.pose import to_body, to_map, to_map_axes
+from uuv_marl.baselines.memory.pose import to_body_axes, to_map, to_map_axes
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.percept import Fields
 from uuv_marl.scenario import Scenario
@@ -265,7 +265,8 @@ def _lower_scores(w: int, i: int, see: Fields, sectors: ActiveSectors, memory: S
         if score < sectors.most_score - 1.0 and undetected > LIFETIME * evidence * evidence:
             memory.score[w, i, d] = 0.0
             continue
-        x, y = to_body(memory.disc[w, i, d, 0], memory.disc[w, i, d, 1], memory.pose[w, i])
+        disc, pose = memory.disc[w, i, d], memory.pose[w, i]
+        x, y = to_body_axes(disc[0] - pose[0], disc[1] - pose[1], pose)
         away = max(math.hypot(x, y), 1e-6)
         reach = away - memory.disc[w, i, d, 2]
         for a in range(sectors.lower.shape[0]):

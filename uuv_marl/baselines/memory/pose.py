@@ -87,12 +87,6 @@ def to_map(x: float, y: float, pose: Float64) -> tuple[float, float]:
 
 
 @compiled
-def to_body(x: float, y: float, pose: Float64) -> tuple[float, float]:
-    """Transform a point from the map [m] to the body frame [m]; ``pose`` as in ``Surroundings``, shape (4,)."""
-    return to_body_axes(x - pose[0], y - pose[1], pose)
-
-
-@compiled
 def begin_map(w: int, i: int, see: Fields, memory: Surroundings) -> None:
     """First percept: the map's origin is at l(t), its first axis along l(t)'s velocity, or along the bow."""
     v_x, v_y = float(see.reference_velocity[w, i, 0]), float(see.reference_velocity[w, i, 1])

@@ -22,8 +22,6 @@ class Surroundings(NamedTuple):
     actuators: Annotated[Float64, "world vehicle 2 13", "Lag of thrust and total torque: see ``memory.actuators``."]
     reference: Annotated[Float64, "world vehicle 4", "Position of l(t) [m], unit vector of its leg, 0 at rest."]
     reference_speed: Annotated[Float64, "world vehicle", "Speed of l(t) [m/s]."]
-    filtered: Annotated[Float64, "world vehicle 2", "1 if the filter changed the latest velocity; if none was safe."]
-    counted: Annotated[Float64, "world vehicle 2", "Sums of these over earlier decisions."]
     begun: Annotated[Float64, "world vehicle", "1 from the first percept until the vehicle is lost."]
     disc: Annotated[Float64, "world vehicle 12 3", "Obstacles: centre in the map and radius [m]."]
     spread: Annotated[Float64, "world vehicle 12 6", "Their covariance [m2]: xx, xy, xR, yy, yR, RR."]

@@ -3,9 +3,8 @@
 import math
 from typing import Literal, NamedTuple, get_args
 
-import numpy as np
-
-from uuv_marl.baselines.policy import Limits, Policy, surge_resistance, tuned, write_action
+from uuv_marl.baselines.controller import Controller
+from uuv_marl.baselines.policy import Limits, surge_resistance, tuned, write_action
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Fields, Percept, Starts
@@ -34,7 +33,7 @@ class BioInspiredGains(NamedTuple):
 ObstacleTerm = Literal["per_echo", "per_obstacle"]
 
 
-class BioInspired(Policy):
+class BioInspired(Controller):
     """Attraction to l(t), attraction and repulsion among neighbours, repulsion from obstacles. Eq. 18-22.
 
     Args:
@@ -44,34 +43,26 @@ class BioInspired(Policy):
     """
 
     requirements = PolicyRequirements(outputs_force=True)
+    Gains = BioInspiredGains
 
     def __init__(
-        self,
-        scenario: Scenario,
-        num_worlds: int = 1,
-        *,
-        gains: BioInspiredGains | None = None,
+        self, scenario: Scenario, num_worlds: int = 1, *, gains: BioInspiredGains | None = None,
         obstacle_term: ObstacleTerm = "per_echo",
-    ) -> None:
-        super().__init__(scenario, num_worlds)
-        self.gains = gains or BioInspiredGains()
+    ) -> None:  # fmt: skip
+        super().__init__(scenario, num_worlds, gains=gains)
         if obstacle_term not in get_args(ObstacleTerm):
             raise PolicyError(f"obstacle_term must be 'per_echo' or 'per_obstacle', got {obstacle_term!r}")
         self._once = obstacle_term == "per_obstacle"
-        self._centres = scenario.sonar.echo_reports == "centre"
 
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
+    def _write(self, percept: Percept, action: Float32) -> None:
         flat = self.flat(percept)
-        action = np.empty((*flat.shape[:2], 2), np.float32)
         _act(flat, self.layout.offsets, self.gains, self.limits, self._once, self._centres, action, self.clamps)
-        return action
 
 
 class BioInspiredPlus(BioInspired):
     """The same controller with feed-forward of the reference's velocity, yaw damping and tuned gains."""
 
-    requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
+    requirements = Controller.requirements
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: BioInspiredGains | None = None) -> None:
         tuned_gains = gains or BioInspiredGains(**tuned("bio_inspired_plus"), feed_forward=FEED_FORWARD)

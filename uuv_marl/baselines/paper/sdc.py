@@ -12,8 +12,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
-from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.baselines.avoidance import bump, pass_obstacle
+from uuv_marl.baselines.controller import Controller
+from uuv_marl.baselines.policy import Limits, surge_resistance, write_action
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.errors import PolicyError
 from uuv_marl.percept import Fields, Percept, Starts
@@ -57,7 +58,7 @@ class SdcMemory(NamedTuple):
     decisions: Annotated[Int64, "world", "Decisions since the slots were assigned, this one included."]
 
 
-class Sdc(Policy):
+class Sdc(Controller):
     """Distributed consensus with prescribed performance; a single vehicle perceives the reference.
 
     Slots are assigned centrally from the first percepts of a world; from then on every vehicle acts on its own percept.
@@ -67,10 +68,11 @@ class Sdc(Policy):
     # Without yaw damping, in the settings tried by hand, the informed vehicle left the others behind: none arrived.
     requirements = PolicyRequirements(("compass", "link", "identity"), yaw_damping_nms=600.0, outputs_force=True)
     Memory: ClassVar[type[Any] | None] = SdcMemory
+    Gains = SdcGains
+    tuned_as = "sdc"
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SdcGains | None = None) -> None:
-        super().__init__(scenario, num_worlds)
-        self.gains = gains or SdcGains(**tuned("sdc"))
+        super().__init__(scenario, num_worlds, gains=gains)
         n = scenario.swarm.num_vehicles
         if n > _MOST_VEHICLES:
             raise PolicyError(
@@ -85,16 +87,14 @@ class Sdc(Policy):
             self._assign(int(w), Percept(percept.flat[w], percept.layout))
         self.memory.decisions[worlds] += 1
 
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        flat, memory = self.flat(percept), self.memory
-        action = np.empty((*flat.shape[:2], 2), np.float32)
-        g = self.gains
+    def _write(self, percept: Percept, action: Float32) -> None:
+        g, memory = self.gains, self.memory
         rho = (g.rho_0 - g.rho_inf) * np.exp(
             -g.kappa * self.scenario.timing.decision_period_s * (memory.decisions - 1)
         ) + g.rho_inf
-        _act(flat, self.at, g, self.limits, memory.slots, memory.depth, rho, action, self.clamps)
-        return action
+        _act(
+            self.flat(percept), self.at, g, self.limits, memory.slots, memory.depth, rho, action, self.clamps
+        )  # fmt: skip
 
     def _assign(self, w: int, percept: Percept) -> None:
         """Assign slots with the smallest sum of squared distances from the start."""
@@ -186,7 +186,7 @@ def _force(
         e_x = -c * slots[own, 0] - s * slots[own, 1] - see.reference[w, i, 0]
         e_y = -c * slots[own, 1] + s * slots[own, 0] - see.reference[w, i, 1]
         z_x, z_y, weight = z_x + g.reference * e_x, z_y + g.reference * e_y, weight + g.reference
-    f_x, f_y, clamped = g.drag * own_drag(u, limits), 0.0, 0
+    f_x, f_y, clamped = g.drag * (surge_resistance(abs(u), limits) * u), 0.0, 0
     if weight > 0.0:
         size = math.hypot(z_x, z_y) / weight
         xi = size / rho

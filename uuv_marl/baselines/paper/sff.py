@@ -8,13 +8,11 @@ splitting term passes obstacles on either side; and the vehicle is pulled to l(t
 import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-import numpy as np
-
-from uuv_marl.baselines.avoidance import bump, own_drag, pass_obstacle
-from uuv_marl.baselines.policy import Limits, Policy, tuned, write_action
+from uuv_marl.baselines.avoidance import bump, pass_obstacle
+from uuv_marl.baselines.controller import Controller
+from uuv_marl.baselines.policy import Limits, surge_resistance, write_action
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.percept import Fields, Percept, Starts
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.views import fields
@@ -54,27 +52,21 @@ class SffMemory(NamedTuple):
     turn: Annotated[Float64, "world vehicle sector 2", "Change of its velocity since then [m/s]."]
 
 
-class Sff(Policy):
+class Sff(Controller):
     """Self-organised fission and fusion, with neighbours' velocities over the link, but not the reference's."""
 
     requirements = PolicyRequirements(("link",), outputs_force=True)
     Memory: ClassVar[type[Any] | None] = SffMemory
-
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: SffGains | None = None) -> None:
-        super().__init__(scenario, num_worlds)
-        self.gains = gains or SffGains(**tuned("sff"))
+    Gains = SffGains
+    tuned_as = "sff"
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Compare the detected neighbours with those of the previous decision."""
         period = self.scenario.timing.decision_period_s
         _remember(self.flat(percept), self.at, period, worlds, self.memory)
 
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        flat = self.flat(percept)
-        action = np.empty((*flat.shape[:2], 2), np.float32)
-        _decide(flat, self.at, self.gains, self.limits, self.memory, action)
-        return action
+    def _write(self, percept: Percept, action: Float32) -> None:
+        _decide(self.flat(percept), self.at, self.gains, self.limits, self.memory, action)
 
 
 @compiled
@@ -97,33 +89,27 @@ def _recall(identity: float, known: Float32) -> int:
 
 @compiled
 def _remember(flat: Float32, at: Starts, period: float, worlds: Bool, memory: SffMemory) -> None:
+    """Update the memory; since the previous decision a vehicle's frame has turned by yaw rate times period."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
-        for i in range(flat.shape[1]):
-            if worlds[w]:
-                _compare(w, i, see, period, memory)
-
-
-@compiled
-def _compare(w: int, i: int, see: Fields, period: float, memory: SffMemory) -> None:
-    """Update one vehicle's memory; since the previous decision its frame has turned by yaw rate times period."""
-    identities, positions, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
-    r = float(see.yaw_rate[w, i, 0])
-    c, s = math.cos(r * period), math.sin(r * period)
-    for k in range(see.detected.shape[2]):
-        old = _recall(see.link_identity[w, i, k], identities)
-        memory.known[w, i, k] = old >= 0
-        if old >= 0:
-            p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
-            v_x, v_y = float(see.link_velocity[w, i, k, 0]), float(see.link_velocity[w, i, k, 1])
-            memory.rate[w, i, k, 0] = (p_x - c * positions[old, 0] - s * positions[old, 1]) / period
-            memory.rate[w, i, k, 1] = (p_y - c * positions[old, 1] + s * positions[old, 0]) / period
-            memory.turn[w, i, k, 0] = v_x - c * moved[old, 0] - s * moved[old, 1]
-            memory.turn[w, i, k, 1] = v_y - c * moved[old, 1] + s * moved[old, 0]
-    for k in range(see.detected.shape[2]):
-        identities[k] = see.link_identity[w, i, k]
-        positions[k, 0], positions[k, 1] = see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1]
-        moved[k, 0], moved[k, 1] = see.link_velocity[w, i, k, 0], see.link_velocity[w, i, k, 1]
+        for i in range(flat.shape[1] if worlds[w] else 0):
+            identities, positions, moved = memory.identity[w, i], memory.position[w, i], memory.velocity[w, i]
+            r = float(see.yaw_rate[w, i, 0])
+            c, s = math.cos(r * period), math.sin(r * period)
+            for k in range(see.detected.shape[2]):
+                old = _recall(see.link_identity[w, i, k], identities)
+                memory.known[w, i, k] = old >= 0
+                if old >= 0:
+                    p_x, p_y = float(see.neighbour[w, i, k, 0]), float(see.neighbour[w, i, k, 1])
+                    v_x, v_y = float(see.link_velocity[w, i, k, 0]), float(see.link_velocity[w, i, k, 1])
+                    memory.rate[w, i, k, 0] = (p_x - c * positions[old, 0] - s * positions[old, 1]) / period
+                    memory.rate[w, i, k, 1] = (p_y - c * positions[old, 1] + s * positions[old, 0]) / period
+                    memory.turn[w, i, k, 0] = v_x - c * moved[old, 0] - s * moved[old, 1]
+                    memory.turn[w, i, k, 1] = v_y - c * moved[old, 1] + s * moved[old, 0]
+            for k in range(see.detected.shape[2]):
+                identities[k] = see.link_identity[w, i, k]
+                positions[k, 0], positions[k, 1] = see.neighbour[w, i, k, 0], see.neighbour[w, i, k, 1]
+                moved[k, 0], moved[k, 1] = see.link_velocity[w, i, k, 0], see.link_velocity[w, i, k, 1]
 
 
 @compiled
@@ -141,7 +127,7 @@ def _force(w: int, i: int, see: Fields, g: SffGains, limits: Limits, memory: Sff
     u, v = float(see.velocity[w, i, 0]), float(see.velocity[w, i, 1])
     l_x, l_y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
     pull = g.pull / math.sqrt(g.pull_length * g.pull_length + l_x * l_x + l_y * l_y)
-    f_x, f_y = pull * l_x + g.drag * own_drag(u, limits), pull * l_y
+    f_x, f_y = pull * l_x + g.drag * (surge_resistance(abs(u), limits) * u), pull * l_y
     mean_x, mean_y, num = 0.0, 0.0, 0
     change, leader_x, leader_y = -1.0, 0.0, 0.0
     for k in range(see.detected.shape[2]):

@@ -125,14 +125,7 @@ def steer_safely(
     w: int, i: int, w_x: float, w_y: float, num: int, planes: Float64, gain: float, limits: Limits,
     memory: Surroundings, action: Float32,
 ) -> None:  # fmt: skip
-    """Write the action for the velocity nearest to a desired one that satisfies the half-planes.
-
-    ``memory.filtered`` records whether the filter acts.
-    """
-    safe_x, safe_y, broken = nearest_velocity(w_x, w_y, planes, num, 0, full_speed(limits))
-    if broken > 0.0 or not keeps(w_x, w_y, planes, num):
-        memory.filtered[w, i, 0] = 1.0
-    if broken > 0.0:
-        memory.filtered[w, i, 1] = 1.0
+    """Write the action for the velocity nearest to a desired one that satisfies the half-planes."""
+    safe_x, safe_y, _ = nearest_velocity(w_x, w_y, planes, num, 0, full_speed(limits))
     w_x, w_y = to_body_axes(safe_x, safe_y, memory.pose[w, i])
     steer(w_x, w_y, memory.motion[w, i, 0], memory.motion[w, i, 1], gain, limits, action[w, i])

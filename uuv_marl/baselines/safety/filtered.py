@@ -13,7 +13,7 @@ from uuv_marl.baselines.steering import velocity_gain
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.turning import turning_radius
-from uuv_marl.types import Bool, Float64, Int64
+from uuv_marl.types import Bool, Float64
 
 TURNS = 8.0
 """Least number of turning radii at l(t)'s speed in which a vehicle with a rudder closes a distance. By hand."""
@@ -46,19 +46,6 @@ class Filtered(Policy):
         """Force per velocity error [N s/m]."""
         self.planes: Float64 = np.zeros((self.memory.disc.shape[2] + scenario.sonar.num_sectors, 3))
         """Work array for half-planes, shape (disc + sector, 3)."""
-
-    @property
-    def changed(self) -> Int64:
-        """Velocities that the filter changed since the reset, shape (world,)."""
-        return self._count(0)
-
-    @property
-    def infeasible(self) -> Int64:
-        """Changed velocities for which no velocity was safe, so that the least unsafe was taken, shape (world,)."""
-        return self._count(1)
-
-    def _count(self, column: int) -> Int64:
-        return (self.memory.counted + self.memory.filtered)[..., column].sum(axis=1).astype(np.int64)
 
     @property
     def memory_s(self) -> float:

@@ -7,20 +7,14 @@ Otherwise actions stay as they are, bit for bit.
 With a rudder the action is the desired force; its torque is close to the rudder's at cruise speed.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
-from numpy.typing import NDArray
-
 from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.pose import DeadReckoning, reckoned, to_map_axes
-from uuv_marl.baselines.policy import Limits, Policy, part_of, parts_of
+from uuv_marl.baselines.policy import Limits, Policy
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier, keeps, planes_of, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered
 from uuv_marl.baselines.steering import steady_velocity
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.arguments import SeedLike
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.types import Bool, Float32, Float64
@@ -30,38 +24,17 @@ class Guarded(Filtered):
     """An inner policy, made for the same scenario and worlds, inside the safety filter."""
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: Policy, barrier: Barrier = GUARD) -> None:
-        self.inner = inner
+        self.parts = {"inner": inner}
         self.name = inner.name
         self.requirements = inner.requirements
         super().__init__(scenario, num_worlds, barrier)
 
-    def reset(self, seed: SeedLike = None, worlds: Sequence[int] | None = None) -> None:
-        """Reset the inner policy, too."""
-        super().reset(seed, worlds)
-        self.inner.reset(seed, worlds)
-
     def decide(self, percept: Percept) -> Float32:
         """Actions of the inner policy, shape (world, vehicle, 2), changed where they are not safe."""
-        self.inner.active = self.active
-        self.inner.update_memory(percept)
-        action = self.inner.decide(percept)
+        action = self.decide_part("inner", percept)
         guard_all(self.active, self.model.own, self.barrier, self.limits, self.gain, self.memory, self.planes, action)
-        self.clamps[...] = self.inner.clamps
+        self.clamps[...] = self.parts["inner"].clamps
         return action
-
-    def record_action(self, action: Float32) -> None:
-        """Report the actions to the inner policy, too."""
-        super().record_action(action)
-        self.inner.record_action(action)
-
-    def snapshot(self) -> dict[str, NDArray[Any]]:
-        """Snapshots of both."""
-        return super().snapshot() | parts_of(inner=self.inner)
-
-    def restore(self, snapshot: Mapping[str, NDArray[Any]]) -> None:
-        """Restore both."""
-        super().restore(snapshot)
-        self.inner.restore(part_of(snapshot, "inner"))
 
 
 @compiled
@@ -77,7 +50,7 @@ def guard_all(
     worlds: Bool, own: DeadReckoning, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings,
     planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
-    """Replace unsafe actions in place; ``memory.filtered`` records where the filter acts."""
+    """Replace unsafe actions in place."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if not worlds[w] or memory.begun[w, i] == 0.0:
@@ -88,4 +61,3 @@ def guard_all(
                 a_x, a_y = steady_velocity(action[w, i, 0], action[w, i, 1], limits)
                 w_x, w_y = to_map_axes(a_x, a_y, memory.pose[w, i])
                 steer_safely(w, i, w_x, w_y, num, planes, gain, limits, memory, action)
-                memory.filtered[w, i, 0] = 1.0

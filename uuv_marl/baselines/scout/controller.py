@@ -12,7 +12,7 @@ from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import middle
-from uuv_marl.baselines.memory.uncertainty import uncertainty
+from uuv_marl.baselines.memory.surroundings import uncertainty
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.safety.barrier import Barrier, margin, planes_of, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered
@@ -66,20 +66,13 @@ class Scout(Filtered):
 
 
 @compiled
-def uncertain_gains(g: ScoutGains, share: float) -> ScoutGains:
-    """Gains at an uncertainty ``share`` from 0 to 1: pull and push change."""
-    pull, push = math.exp(share * g.pull_if_uncertain), math.exp(share * g.push_if_uncertain)
-    return ScoutGains(
-        g.pull * pull, g.push * push, g.push_range, g.pull_at_rest, g.push_at_rest, g.together, g.behind_m, g.steering,
-        g.memory_s, g.lead, g.pull_if_uncertain, g.push_if_uncertain,
-    )  # fmt: skip
-
-
-@compiled
 def desired_velocity(w: int, i: int, g: ScoutGains, memory: Surroundings) -> tuple[float, float]:
     """Desired velocity without regard to obstacles, in the vehicle's map [m/s]."""
     pose, reference, speed = memory.pose[w, i], memory.reference[w, i], memory.reference_speed[w, i]
     pull, push, together = g.pull, g.push, g.together
+    if speed > 0.0 and (g.pull_if_uncertain != 0.0 or g.push_if_uncertain != 0.0):
+        share = uncertainty(w, i, memory)
+        pull, push = pull * math.exp(share * g.pull_if_uncertain), push * math.exp(share * g.push_if_uncertain)
     if reference[2] == 0.0 and reference[3] == 0.0:
         pull, push, together = pull * g.pull_at_rest, push * g.push_at_rest, 0.0
     to_x = reference[0] - g.behind_m * reference[2] - pose[0]
@@ -144,16 +137,10 @@ def decide_all(
     planes: Float64, action: Float32,
 ) -> None:  # fmt: skip
     """Write every vehicle's action."""
-    adapts = g.pull_if_uncertain != 0.0 or g.push_if_uncertain != 0.0
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and memory.begun[w, i] > 0.0:
-                own = (
-                    uncertain_gains(g, uncertainty(w, i, memory))
-                    if adapts and memory.reference_speed[w, i] > 0.0
-                    else g
-                )
-                w_x, w_y = desired_velocity(w, i, own, memory)
+                w_x, w_y = desired_velocity(w, i, g, memory)
                 w_x, w_y = modulated(w_x, w_y, w, i, barrier, memory)
                 num = planes_of(w, i, period, barrier, memory, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain * g.steering, limits, memory, action)

@@ -4,16 +4,16 @@ A fault degrades the thruster, the yaw torque or a sonar array of some vehicles 
 """
 
 import math
+from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from uuv_marl.scenario import Scenario
-from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
-from uuv_marl.sim.disturbances.purposes import MISMATCH, ONSET, VICTIM
+from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner, from_source
 from uuv_marl.sim.exponential import exp
 from uuv_marl.sim.model import Rules
-from uuv_marl.sim.random import uniform, uniforms
+from uuv_marl.sim.random import MISMATCH, ONSET, VICTIM, uniform, uniforms
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import Plant, advance_lagging, plant, wrap
@@ -56,6 +56,13 @@ class Hull(NamedTuple):
     thrust: Annotated[Float64, "world vehicle", "Its thrust, as a share of the scenario's."]
     tau: Annotated[Float64, "world vehicle 2", "Thrust [N] and torque [N m] (or rudder [rad]) in the water now."]
     broken: Annotated[Int64, "world vehicle fault 2", "First control step of each fault, and the end."]
+
+
+_PLANT = f"Plant({', '.join(f'hull.plants[w, i, {k}]' for k in range(PLANT))})"
+own_plant: Callable[[int, int, Hull], Plant] = compiled_inline(
+    from_source("own_plant", "w, i, hull", _PLANT, globals())
+)
+"""Vehicle i's own parameters; ``hull.plants`` holds the fields in order."""
 
 
 def actuation(scenario: Scenario) -> Actuation:
@@ -115,12 +122,6 @@ def window(key: np.uint64, fault: int, vehicle: int, duration_s: float, scenario
     first = math.ceil(onset / control_step_s - 1e-9)
     lasts = settings.duration_s
     return first, _NEVER if lasts is None else first + math.ceil(lasts / control_step_s - 1e-9)
-
-
-def hit(tick: Int64, hull: Hull) -> Bool:
-    """Vehicles that a fault has affected before this control step of each world, shape (world, vehicle)."""
-    first, end = hull.broken[..., 0], hull.broken[..., 1]
-    return np.logical_or.reduce((first < end) & (first < tick[:, None, None]), axis=2)
 
 
 @compiled
@@ -184,16 +185,6 @@ def integrate_each(
             hull.tau[w, i, 0], hull.tau[w, i, 1] = u_2, r_2
         now.psi[i] = wrap(now.psi[i])
         now.cos[i], now.sin[i] = cos_sin(now.psi[i])
-
-
-@compiled_inline
-def own_plant(w: int, i: int, hull: Hull) -> Plant:
-    """Vehicle i's own parameters; ``hull.plants`` holds the fields in order."""
-    p = hull.plants[w, i]
-    return Plant(
-        p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14], p[15], p[16],
-        p[17], p[18], p[19], p[20], p[21], p[22], p[23], p[24], p[25], p[26], p[27], p[28], p[29], p[30], p[31],
-    )  # fmt: skip
 
 
 @compiled_inner

@@ -16,10 +16,9 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.disturbance_sections import AROUND_M
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
-from uuv_marl.sim.disturbances.purposes import DIRECTION, EDDY_PLACE, GUST
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.perception import saturate
-from uuv_marl.sim.random import normals, uniform, uniforms
+from uuv_marl.sim.random import DIRECTION, EDDY_PLACE, GUST, normals, uniform, uniforms
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.types import Float64
@@ -75,12 +74,6 @@ class FlowField(NamedTuple):
         flow = Flow(self.drift[None], np.zeros((1, 2)), self.eddies[None], np.zeros((1, 0, 2)))
         velocity = [flow_at(0, x, y, self.core_m, flow) for x, y in points.reshape(-1, 2).tolist()]
         return np.array(velocity, np.float64).reshape(points.shape)
-
-
-def flow_field(w: int, core_m: float, flow: Flow) -> FlowField:
-    """Present velocity field of world w."""
-    eddies = flow.eddies[w]
-    return FlowField(flow.mean[w] + flow.gust[w], eddies[eddies[:, 2] != 0.0], core_m)
 
 
 def water(scenario: Scenario) -> WaterModel:

@@ -3,59 +3,21 @@
 A world without disturbances has None instead, and its compiled code contains none of this.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import FIELDS, DisturbanceFields, Fields
+from uuv_marl.percept import FIELDS, DisturbanceFields, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.conditions import vehicle_disturbances
 from uuv_marl.sim.arrays import State, World, WorldMap
 from uuv_marl.sim.compiled import compiled_inner
-from uuv_marl.sim.disturbances.actuation import PLANT, Actuation, Hull, actuation, integrate_each, sample_hulls, weaken
-from uuv_marl.sim.disturbances.current import (
-    Flow,
-    WaterModel,
-    advance_gust,
-    read_flow,
-    sample_flow,
-    water,
-    write_velocities,
-)  # fmt: skip
-from uuv_marl.sim.disturbances.modem import Messages, ModemModel, clear_messages, exchange, modem, write_messages
-from uuv_marl.sim.disturbances.navigation import (
-    NavigationErrors,
-    NavigationModel,
-    drift_position,
-    navigate,
-    navigation,
-    sample_navigation_errors,
-)  # fmt: skip
-from uuv_marl.sim.disturbances.noise import (
-    NoiseModel,
-    SensorErrors,
-    add_errors,
-    apply_outages,
-    noise,
-    sample_sensor_errors,
-    schedule_outages,
-    write_ranged,
-)  # fmt: skip
-from uuv_marl.sim.disturbances.readings import (
-    Detections,
-    Readings,
-    any_due,
-    begin_line,
-    collect,
-    line_sizes,
-    remember,
-    store,
-    write_readings,
-)  # fmt: skip
-from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming, due, sonar_timing
+from uuv_marl.sim.disturbances import actuation, current, modem, navigation, noise, readings, schedule
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.tables import allocate
+from uuv_marl.sim.views import disturbance_fields, fields
 from uuv_marl.sim.workspace import Columns
 from uuv_marl.types import UInt64
 
@@ -68,19 +30,22 @@ class Disturbances(NamedTuple):
 
     keys: UInt64
     """Key of each world's episode, for ``uuv_marl.sim.random``, shape (world,)."""
-    water: WaterModel
-    flow: Flow
-    actuation: Actuation
-    hull: Hull
-    sonar_timing: SonarTiming
-    readings: Readings
-    detections: Detections
-    noise: NoiseModel
-    sensor_errors: SensorErrors
-    navigation: NavigationModel
-    navigation_errors: NavigationErrors
-    modem: ModemModel
-    messages: Messages
+    water: current.WaterModel
+    flow: current.Flow
+    actuation_model: actuation.Actuation
+    hull: actuation.Hull
+    sonar_timing: schedule.SonarTiming
+    delay_line: readings.Readings
+    detections: readings.Detections
+    noise_model: noise.NoiseModel
+    sensor_errors: noise.SensorErrors
+    drift_share: float
+    """Error of the estimated position per distance travelled over ground."""
+    compass_bias: float
+    """Standard deviation of a compass's bias [rad]."""
+    navigation_errors: navigation.NavigationErrors
+    modem_model: modem.ModemModel
+    messages: modem.Messages
 
 
 def make_disturbances(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Disturbances | None:
@@ -93,102 +58,105 @@ def make_disturbances(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]
     """
     if not vehicle_disturbances(scenario) and not set(DISTURBANCE_CHANNELS) & set(scenario.sonar.channels):
         return None
-    own = {"eddy": scenario.max_eddies, "plant": PLANT, "fault": len(scenario.faults)}
+    own = {"eddy": scenario.max_eddies, "plant": actuation.PLANT, "fault": len(scenario.faults)}
     peers = sizes["vehicle"] if "modem" in scenario.sonar.channels else 0
-    sizes = {**sizes, **own, **line_sizes(scenario), "peer": peers}
+    sizes = {**sizes, **own, **readings.line_sizes(scenario), "peer": peers}
     return Disturbances(
         keys=keys,
-        water=water(scenario),
-        flow=allocate(Flow, sizes),
-        actuation=actuation(scenario),
-        hull=allocate(Hull, sizes),
-        sonar_timing=sonar_timing(scenario),
-        readings=allocate(Readings, sizes),
-        detections=allocate(Detections, sizes),
-        noise=noise(scenario),
-        sensor_errors=allocate(SensorErrors, sizes),
-        navigation=navigation(scenario),
-        navigation_errors=allocate(NavigationErrors, sizes),
-        modem=modem(scenario),
-        messages=allocate(Messages, sizes),
+        water=current.water(scenario),
+        flow=allocate(current.Flow, sizes),
+        actuation_model=actuation.actuation(scenario),
+        hull=allocate(actuation.Hull, sizes),
+        sonar_timing=schedule.sonar_timing(scenario),
+        delay_line=allocate(readings.Readings, sizes),
+        detections=allocate(readings.Detections, sizes),
+        noise_model=noise.noise_model(scenario),
+        sensor_errors=allocate(noise.SensorErrors, sizes),
+        drift_share=scenario.navigation.drift_share,
+        compass_bias=math.radians(scenario.navigation.compass_bias_deg),
+        navigation_errors=allocate(navigation.NavigationErrors, sizes),
+        modem_model=modem.modem_model(scenario),
+        messages=allocate(modem.Messages, sizes),
     )
 
 
-def sample_disturbances(
-    w: int, scenario: Scenario, world_map: WorldMap, duration_s: float, disturbances: Disturbances
-) -> None:
+def sample_disturbances(w: int, scenario: Scenario, world_map: WorldMap, duration_s: float, d: Disturbances) -> None:
     """Sample the disturbances of world w's new episode from its key."""
-    key = np.uint64(disturbances.keys[w])
+    key = np.uint64(d.keys[w])
     corners = [points[: last + 1] for points, last in zip(world_map.waypoints[w], world_map.last[w], strict=True)]
-    sample_flow(w, key, np.concatenate(corners), scenario, disturbances.water, disturbances.flow)
-    sample_hulls(w, key, duration_s, scenario, disturbances.hull)
-    sample_sensor_errors(w, key, disturbances.noise, disturbances.sensor_errors)
-    sample_navigation_errors(w, key, disturbances.navigation, disturbances.navigation_errors)
-    clear_messages(w, disturbances.messages)
+    current.sample_flow(w, key, np.concatenate(corners), scenario, d.water, d.flow)
+    actuation.sample_hulls(w, key, duration_s, scenario, d.hull)
+    noise.sample_sensor_errors(w, key, d.noise_model, d.sensor_errors)
+    navigation.sample_navigation_errors(w, key, d.compass_bias, d.navigation_errors)
+    d.messages.sent[w], d.messages.received[w] = -1.0, -1.0
 
 
 def disturbance_tables(disturbances: Disturbances | None) -> tuple[Any, ...]:
     """All arrays that change, for snapshots."""
     d = disturbances
-    return () if d is None else (d.flow, d.hull, d.readings, d.sensor_errors, d.navigation_errors, d.messages)
+    return () if d is None else (d.flow, d.hull, d.delay_line, d.sensor_errors, d.navigation_errors, d.messages)
 
 
 @compiled_inner
 def integrate_disturbed(w: int, state: State, rules: Rules, now: Columns, d: Disturbances) -> None:
     """Move world w by one control step. The forces in the water, ``hull.tau``, are written."""
-    weaken(w, state.tick[w], now, d.actuation, d.hull)
-    integrate_each(w, state.alive, rules, now, d.actuation, d.hull, d.flow.flow)
+    actuation.weaken(w, state.tick[w], now, d.actuation_model, d.hull)
+    actuation.integrate_each(w, state.alive, rules, now, d.actuation_model, d.hull, d.flow.flow)
 
 
 @compiled_inner
 def advance_disturbances(w: int, world: World, d: Disturbances) -> None:
     """Update the disturbances at the end of a control step, which ``state.tick`` already counts."""
-    advance_gust(w, d.keys[w], world.state.tick[w], d.water, d.flow)
-    read_flow(w, world.state, d.water, d.flow)
-    drift_position(w, world.state, d.navigation, d.navigation_errors)
-    remember(w, world.state, d.readings)
-    exchange(w, d.keys[w], world, d.modem, d.messages, d.flow, d.navigation_errors)
+    current.advance_gust(w, d.keys[w], world.state.tick[w], d.water, d.flow)
+    current.read_flow(w, world.state, d.water, d.flow)
+    navigation.drift_position(w, world.state, d.drift_share, d.navigation_errors)
+    readings.remember(w, world.state, d.delay_line)
+    modem.exchange(w, d.keys[w], world, d.modem_model, d.messages, d.flow, d.navigation_errors)
 
 
 @compiled_inner
 def begin_disturbances(w: int, world: World, d: Disturbances) -> None:
     """Start the disturbances from the present states, after a reset or once states were written by hand."""
-    read_flow(w, world.state, d.water, d.flow)
+    current.read_flow(w, world.state, d.water, d.flow)
     d.navigation_errors.position_error[w] = 0.0
-    schedule_outages(w, d.keys[w], d.noise, d.sensor_errors)
-    begin_line(w, world.state, d.readings)
-    exchange(w, d.keys[w], world, d.modem, d.messages, d.flow, d.navigation_errors)
+    noise.schedule_outages(w, d.keys[w], d.noise_model, d.sensor_errors)
+    readings.begin_line(w, world.state, d.delay_line)
+    modem.exchange(w, d.keys[w], world, d.modem_model, d.messages, d.flow, d.navigation_errors)
 
 
 @compiled_inner
-def reads(w: int, tick: int, d: Disturbances) -> bool:
-    """Whether an array of world w takes a reading at this control step that a decision will use."""
-    return any_due(w, tick, d.sonar_timing, d.readings)
-
-
-@compiled_inner
-def take_readings(w: int, world: World, d: Disturbances, see: Fields) -> None:
+def take_readings(w: int, world: World, at: Starts, d: Disturbances) -> None:
     """Store the arrays' readings of this control step, from percepts that hold true values."""
-    tick, timing = world.state.tick[w], d.sonar_timing
+    tick, timing, see = world.state.tick[w], d.sonar_timing, fields(world.senses.percept, at)
     for a in range(0 if timing.ideal else timing.every.shape[0]):
-        number = due(tick - d.readings.began[w], timing.every[a], timing.delay, timing.control_steps)
+        number = schedule.due(tick - d.delay_line.began[w], timing.every[a], timing.delay, timing.control_steps)
         if number >= 0:
-            at = Reading(w, a, number, tick, number % d.readings.target_index.shape[1])
-            num = collect(at, world, see, timing, d.navigation_errors, d.readings, d.detections)
+            reading = schedule.Reading(w, a, number, tick, number % d.delay_line.target_index.shape[1])
+            num = readings.collect(reading, world, see, timing, d.navigation_errors, d.delay_line, d.detections)
             passive = timing.active[a] == timing.active[a + 1]
-            add_errors(at, num, d.keys[w], passive, d.noise, d.sensor_errors, d.detections)
-            store(at, num, timing, d.detections, d.readings)
-            apply_outages(
-                at, d.keys[w], timing, d.noise, d.sensor_errors, d.actuation, d.hull, d.detections, d.readings
+            noise.add_errors(reading, num, d.keys[w], passive, d.noise_model, d.sensor_errors, d.detections)
+            readings.store(reading, num, timing, d.detections, d.delay_line)
+            noise.apply_outages(
+                reading,
+                d.keys[w],
+                timing,
+                d.noise_model,
+                d.sensor_errors,
+                d.actuation_model,
+                d.hull,
+                d.detections,
+                d.delay_line,
             )
 
 
 @compiled_inner
-def apply_disturbances(w: int, world: World, d: Disturbances, see: Fields, more: DisturbanceFields) -> None:
+def apply_disturbances(w: int, world: World, at: Starts, d: Disturbances) -> None:
     """Turn percepts that hold true values into what vehicles observe; ``detected_index`` is written, too."""
+    see, more = fields(world.senses.percept, at), disturbance_fields(world.senses.percept, at)
     if not d.sonar_timing.ideal:
-        write_readings(w, world, d.sonar_timing, d.navigation_errors, d.readings, see, more)
-    write_ranged(w, world.state.alive, d.sonar_timing, d.noise, more)
-    write_velocities(w, world, d.water, d.flow, see, more)
-    write_messages(w, world, d.messages, d.navigation_errors, more)
-    navigate(w, world, d.navigation, d.navigation_errors, see)
+        readings.write_readings(w, world, d.sonar_timing, d.navigation_errors, d.delay_line, see, more)
+    noise.write_ranged(w, world.state.alive, d.sonar_timing, d.noise_model, more)
+    current.write_velocities(w, world, d.water, d.flow, see, more)
+    modem.write_messages(w, world, d.messages, d.navigation_errors, more)
+    if d.drift_share != 0.0 or d.compass_bias != 0.0:
+        navigation.navigate(w, world, d.navigation_errors, see)

@@ -17,9 +17,8 @@ from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.disturbances.current import Flow, over_ground
 from uuv_marl.sim.disturbances.navigation import NavigationErrors, by_compass
-from uuv_marl.sim.disturbances.purposes import MESSAGE
 from uuv_marl.sim.perception import saturate
-from uuv_marl.sim.random import uniform
+from uuv_marl.sim.random import MESSAGE, uniform
 from uuv_marl.sim.tables import described
 from uuv_marl.types import Float64
 
@@ -45,15 +44,10 @@ class Messages(NamedTuple):
     received: Annotated[Float64, "world vehicle peer 3", "Latest message received from each other vehicle, likewise."]
 
 
-def modem(scenario: Scenario) -> ModemModel:
+def modem_model(scenario: Scenario) -> ModemModel:
     """Constants of the scenario's messages for the compiled functions."""
     round_s = scenario.modem.round_s(scenario.swarm.num_vehicles, scenario.latency.sound_speed_mps)
     return ModemModel(round_s, scenario.timing.control_step_s, scenario.modem.loss_probability)
-
-
-def clear_messages(w: int, messages: Messages) -> None:
-    """Clear all messages for world w's new episode."""
-    messages.sent[w], messages.received[w] = -1.0, -1.0
 
 
 @compiled

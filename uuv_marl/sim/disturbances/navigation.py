@@ -10,24 +10,13 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from uuv_marl.percept import MAX_SPEED, Fields
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
-from uuv_marl.sim.disturbances.purposes import COMPASS, DRIFT
 from uuv_marl.sim.perception import saturate, toward
-from uuv_marl.sim.random import normal, uniform
+from uuv_marl.sim.random import COMPASS, DRIFT, normal, uniform
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.types import Float64
-
-
-class NavigationModel(NamedTuple):
-    """Constants of a scenario's navigation."""
-
-    drift_share: float
-    """Error of the estimated position per distance travelled over ground."""
-    compass_bias: float
-    """Standard deviation of a compass's bias [rad]."""
 
 
 @described
@@ -39,27 +28,21 @@ class NavigationErrors(NamedTuple):
     bias: Annotated[Float64, "world vehicle 2", "Cosine and sine of its compass's bias, clockwise."]
 
 
-def navigation(scenario: Scenario) -> NavigationModel:
-    """Constants of the scenario's navigation for the compiled functions."""
-    own = scenario.navigation
-    return NavigationModel(own.drift_share, math.radians(own.compass_bias_deg))
-
-
-def sample_navigation_errors(w: int, key: np.uint64, navigation: NavigationModel, errors: NavigationErrors) -> None:
+def sample_navigation_errors(w: int, key: np.uint64, compass_bias: float, errors: NavigationErrors) -> None:
     """Sample drift directions and compass biases of world w's new episode from its key."""
     for i in range(errors.position_error.shape[1]):
         errors.drift_direction[w, i] = cos_sin(2.0 * math.pi * uniform(key, DRIFT, 0, i, 0))
-        errors.bias[w, i] = cos_sin(navigation.compass_bias * normal(key, COMPASS, 0, i, 0))
+        errors.bias[w, i] = cos_sin(compass_bias * normal(key, COMPASS, 0, i, 0))
 
 
 @compiled_inner
-def drift_position(w: int, state: State, navigation: NavigationModel, errors: NavigationErrors) -> None:
+def drift_position(w: int, state: State, drift_share: float, errors: NavigationErrors) -> None:
     """Add the drift of one control step to the position errors."""
-    if navigation.drift_share == 0.0:
+    if drift_share == 0.0:
         return
     for i in range(state.eta.shape[1]):
         dx, dy = state.eta[w, i, 0] - state.before[w, i, 0], state.eta[w, i, 1] - state.before[w, i, 1]
-        off = navigation.drift_share * math.sqrt(dx * dx + dy * dy)
+        off = drift_share * math.sqrt(dx * dx + dy * dy)
         errors.position_error[w, i, 0] += off * errors.drift_direction[w, i, 0]
         errors.position_error[w, i, 1] += off * errors.drift_direction[w, i, 1]
 
@@ -72,10 +55,8 @@ def by_compass(w: int, i: int, north: float, east: float, errors: NavigationErro
 
 
 @compiled_inner
-def navigate(w: int, world: World, navigation: NavigationModel, errors: NavigationErrors, see: Fields) -> None:
+def navigate(w: int, world: World, errors: NavigationErrors, see: Fields) -> None:
     """Write l(t) and the compass into the percepts of world w as each vehicle's navigation estimates them."""
-    if navigation.drift_share == 0.0 and navigation.compass_bias == 0.0:
-        return
     eta, heading, reference = world.state.eta, world.senses.heading, world.facts.reference
     for i in range(eta.shape[1]):
         if not world.state.alive[w, i]:

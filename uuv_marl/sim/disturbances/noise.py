@@ -10,9 +10,9 @@ import numpy as np
 
 from uuv_marl.percept import DisturbanceFields
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim import random
 from uuv_marl.sim.compiled import compiled_inline, compiled_inner
 from uuv_marl.sim.disturbances.actuation import ARRAY, Actuation, Hull, acts
-from uuv_marl.sim.disturbances.purposes import BEARING_RANGE, DETECTION, FACTOR, FALSE_ECHO, FALSE_PLACE, SILENCE
 from uuv_marl.sim.disturbances.readings import (
     FALSE_DETECTION,
     NO_DETECTION,
@@ -25,7 +25,6 @@ from uuv_marl.sim.disturbances.readings import (
 )
 from uuv_marl.sim.disturbances.schedule import Reading, SonarTiming
 from uuv_marl.sim.exponential import exp
-from uuv_marl.sim.random import log, normal, normals, uniform, uniforms
 from uuv_marl.sim.sonar import suite
 from uuv_marl.sim.tables import Bounds, described
 from uuv_marl.sim.trigonometry import cos_sin
@@ -78,7 +77,7 @@ class SensorErrors(NamedTuple):
     ]
 
 
-def noise(scenario: Scenario) -> NoiseModel:
+def noise_model(scenario: Scenario) -> NoiseModel:
     """Constants of the scenario's sonar errors for the compiled functions."""
     settings, arrays = scenario.noise, scenario.sonar.arrays
     half_range = {"active": settings.active_r50_m, "passive": settings.passive_r50_m}
@@ -91,7 +90,7 @@ def noise(scenario: Scenario) -> NoiseModel:
         passive_ranges=settings.passive_ranges,
         nominal_range=settings.nominal_range_m,
         half_range=np.array([half_range[array.kind] for array in arrays]),
-        decades=np.array([settings.detection_sd_db * log(10.0) / decibels[array.kind] for array in arrays]),
+        decades=np.array([settings.detection_sd_db * random.log(10.0) / decibels[array.kind] for array in arrays]),
         silence=settings.silence_probability,
         silent_readings=settings.silence_readings,
         false_echo=settings.false_echo_probability,
@@ -104,7 +103,7 @@ def noise(scenario: Scenario) -> NoiseModel:
 def sample_sensor_errors(w: int, key: np.uint64, noise: NoiseModel, errors: SensorErrors) -> None:
     """Sample the lasting factors of world w's new episode from its key."""
     for i in range(errors.factor.shape[1]):
-        errors.factor[w, i] = exp(noise.factor_log_sd * normal(key, FACTOR, 0, i, 0))
+        errors.factor[w, i] = exp(noise.factor_log_sd * random.normal(key, random.FACTOR, 0, i, 0))
 
 
 @compiled_inner
@@ -112,7 +111,7 @@ def schedule_outages(w: int, key: np.uint64, noise: NoiseModel, errors: SensorEr
     """Sample the first outage of each array of world w."""
     for i in range(errors.silent.shape[1]):
         for a in range(errors.silent.shape[2]):
-            errors.silent[w, i, a] = gap(uniform(key, SILENCE, 0, i, a), noise.silence)
+            errors.silent[w, i, a] = gap(random.uniform(key, random.SILENCE, 0, i, a), noise.silence)
 
 
 @compiled_inline
@@ -122,7 +121,7 @@ def gap(chance: float, probability: float) -> int:
         return _NEVER
     if probability >= 1.0:
         return 0
-    return int(min(log(1.0 - chance) / log(1.0 - probability), float(_NEVER)))
+    return int(min(random.log(1.0 - chance) / random.log(1.0 - probability), float(_NEVER)))
 
 
 @compiled_inner
@@ -148,7 +147,9 @@ def drop_missed(at: Reading, num: int, key: np.uint64, noise: NoiseModel, detect
     """
     w, decades, half_range = at.w, noise.decades[at.a], noise.half_range[at.a]
     for q in range(num):
-        excess, _ = normals(key, DETECTION, at.tick, detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE)
+        excess, _ = random.normals(
+            key, random.DETECTION, at.tick, detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE
+        )
         detections.first[w, q] = half_range * exp(decades * excess)
     for q in range(num):
         if detections.reach[w, q] >= detections.first[w, q]:
@@ -163,7 +164,9 @@ def sample_perturbations(at: Reading, num: int, key: np.uint64, noise: NoiseMode
     """
     w, bearing = at.w, noise.bearing
     for q in range(num):
-        side, off = normals(key, BEARING_RANGE, at.tick, detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE)
+        side, off = random.normals(
+            key, random.BEARING_RANGE, at.tick, detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE
+        )
         detections.first[w, q], detections.second[w, q] = cos_sin(bearing * side)
         detections.third[w, q] = off
 
@@ -226,11 +229,11 @@ def add_false_echoes(
     # Offset from an active array's sub-sectors to its echoes.
     beyond = 0 if passive else readings.target_index.shape[3] - timing.active[-1] + timing.active[a] - first
     for i in range(readings.target_index.shape[2]):
-        detections.code[w, i] = first + gap(uniform(key, FALSE_ECHO, at.tick, i, first), noise.false_echo)
+        detections.code[w, i] = first + gap(random.uniform(key, random.FALSE_ECHO, at.tick, i, first), noise.false_echo)
     for i in range(readings.target_index.shape[2]):
         k = detections.code[w, i]
         while k < end:  # from one to the next, so that a vehicle without any costs one draw
-            far, side = uniforms(key, FALSE_PLACE, at.tick, i, k)
+            far, side = random.uniforms(key, random.FALSE_PLACE, at.tick, i, k)
             away = noise.range[a] * far if noise.passive_ranges or not passive else noise.nominal_range
             place = k + beyond
             empty = readings.target_index[w, slot, i, place] == NO_DETECTION
@@ -240,7 +243,7 @@ def add_false_echoes(
                 readings.reach[w, slot, i, place] = away
                 readings.position[w, slot, i, place, 0] = away * (c * noise.lower[k, 0] - s * noise.lower[k, 1])
                 readings.position[w, slot, i, place, 1] = away * (s * noise.lower[k, 0] + c * noise.lower[k, 1])
-            k += 1 + gap(uniform(key, FALSE_ECHO, at.tick, i, k + 1), noise.false_echo)
+            k += 1 + gap(random.uniform(key, random.FALSE_ECHO, at.tick, i, k + 1), noise.false_echo)
 
 
 @compiled_inner
@@ -248,7 +251,7 @@ def is_silent(at: Reading, i: int, key: np.uint64, noise: NoiseModel, errors: Se
     """Whether an outage silences an array of vehicle i at a reading; ``errors`` is written when an outage is over."""
     while at.number - errors.silent[at.w, i, at.a] >= noise.silent_readings:
         end = errors.silent[at.w, i, at.a] + noise.silent_readings
-        errors.silent[at.w, i, at.a] = end + gap(uniform(key, SILENCE, end, i, at.a), noise.silence)
+        errors.silent[at.w, i, at.a] = end + gap(random.uniform(key, random.SILENCE, end, i, at.a), noise.silence)
     return at.number >= errors.silent[at.w, i, at.a]
 
 
