@@ -109,7 +109,7 @@ def test_results_of_something_else_are_refused(tmp_path):
         Results(tmp_path / "results.json" / "below", [quick()])
     path = tmp_path / "results.json"
     path.write_text(path.read_text().replace('"fingerprint": "', '"fingerprint": "0'))
-    with pytest.raises(ResultsError, match="other code"):
+    with pytest.raises(ResultsError, match=r"comes from code \w+, and here is \w+; move it away"):
         Results(tmp_path, [quick()])
     path.write_text("{")
     with pytest.raises(ResultsError, match="can't be read"):

@@ -201,6 +201,7 @@ def test_a_task_that_is_named_takes_fields_too():
     ("folow", "task 'folow' is unknown; did you mean 'follow'"),
     ("nowhere:Task", "task 'nowhere:Task' can't be imported: No module named 'nowhere'"),
     ("json:dumps", "task 'json:dumps' must be a subclass of uuv_marl.tasks.Task"),
+    (Follow, "task must be a name; give module:Class, such as 'uuv_marl.tasks.follow:Follow'"),
     ({"name": "reach", "near_m": -3.0}, "task.near_m must be greater than or equal to 0.001, got -3.0"),
     ({"name": "reach", "far_m": 3.0}, "task.far_m is unknown; .*near_m"),
     ({"near_m": 3.0}, "task.name is missing"),

@@ -150,9 +150,11 @@ def test_every_vehicle_and_variant_runs_and_is_shown(name, tmp_path):
     (tmp_path / "again.toml").write_text(to_toml(scenario))
     assert load_scenario(tmp_path / "again.toml").vehicle == scenario.vehicle
     shown = tomllib.loads(show_vehicle(name))
-    loaded = load_vehicle(name)
+    plain, *variants = name.split("+")
+    loaded = load_vehicle(plain)
     for section in ("vehicle", "actuators"):
         assert {field: loaded[section][field] for field in shown[section]} == shown[section]
+    assert {*variants} <= {*shown.get("variants", {})}
 
 
 def test_a_file_of_ones_own_has_variants_too(tmp_path):

@@ -146,6 +146,7 @@ def _batch(
         watch(swarm, None)
     diverged: list[str] = []
     report_every = max(1, round(2.0 / period))
+    share = lambda: float(np.where(active, swarm.facts.time_s, limits).sum() / limits.sum())  # noqa: E731
     while active.any():
         action = actor.act(percept)
         percept = swarm.step(action, active)
@@ -167,12 +168,13 @@ def _batch(
                 obstacles=world_map.obstacles[w, :discs].astype(np.float32),
                 waypoints=world_map.waypoints[w, 0, : int(world_map.last[w, 0]) + 1].astype(np.float32),
             )
+            report(share())
         active &= ~ended
         actor.active[:] = active
         if step % every == 0:
             samples.append(_sample(swarm))
         if step % report_every == 0:
-            report(float(np.where(active, swarm.facts.time_s, limits).sum() / limits.sum()))
+            report(share())
     if diverged:
         raise DivergenceError("; ".join(diverged))
 

@@ -162,7 +162,7 @@ def _saved(folder: Path, scenario: str | None, policies: Sequence[str]) -> tuple
     if content["fingerprint"] != source_fingerprint():
         say(f"{folder} comes from other code of uuv_marl, so that an episode may differ from the saved one.")
     scenarios = content["scenarios"]
-    name = scenario or min(scenarios)
+    name = scenario or min(scenarios, default="")
     if name not in scenarios:
         raise ReplayError(f"{folder} holds no {name!r} but {', '.join(sorted(scenarios))}; choose with --scenario")
-    return scenarios[name], policies or sorted(content["policies"])[:MOST_EPISODES]
+    return scenarios[name], policies or sorted(content["policies"])[:MOST_EPISODES] or [_POLICY]
