@@ -1,7 +1,6 @@
 """Whatever enters compiled code is checked first: percepts of others, snapshots, masks; and a runaway is named."""
 
 import io
-import logging
 import shutil
 import subprocess
 import sys
@@ -23,7 +22,6 @@ from uuv_marl.benchmark.results import Results, load_trace
 from uuv_marl.cli import app, main
 from uuv_marl.cli.console import _width, console
 from uuv_marl.errors import DivergenceError
-from uuv_marl.extras import silenced
 from uuv_marl.paths import user_path
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.replay.page import write_page
@@ -356,11 +354,3 @@ for arguments in {lines!r}:
     run = [sys.executable, "-OO", "-c", code]
     done = subprocess.run(run, cwd=tmp_path, capture_output=True, encoding="utf-8", check=False)
     assert done.returncode == 0, done.stderr[-2000:]
-
-
-def test_what_libraries_are_told_is_taken_back():
-    log = logging.getLogger("some.library")
-    log.setLevel(logging.INFO)
-    with silenced("some.library", logging.ERROR):
-        assert log.level == logging.ERROR
-    assert log.level == logging.INFO

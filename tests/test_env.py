@@ -9,7 +9,7 @@ import pytest
 
 import uuv_marl
 from uuv_marl import load_scenario, uuv_swarm_v1
-from uuv_marl.baselines import make_policy, with_policy_requirements
+from uuv_marl.baselines import make_policy
 from uuv_marl.percept import Percept
 from uuv_marl.sim.swarm import Swarm
 
@@ -50,27 +50,6 @@ def test_render():
 
 
 SHORT = {"time_limit.factor": 0.05, "time_limit.extra_s": 20.0}
-
-
-@pytest.mark.parametrize("name", ["bio_inspired", "bio_inspired_plus", "sff", "sdc", "random"])
-@pytest.mark.parametrize("scenario", ["lossy", "random_field"])
-def test_a_policy_drives_the_environment_as_it_drives_the_swarm(name, scenario):
-    """From observations alone, a whole episode, bit for bit the batched run."""
-    losses = {"losses.times_s": [2.0, 4.0, 9.0]} if scenario == "lossy" else {}
-    granting = with_policy_requirements(name, load_scenario(scenario, overrides={**SHORT, **losses}))
-    env = uuv_marl.parallel_env(granting)
-    through_env = make_policy(name, env)
-    seeds = [11, 12]
-    swarm, batched = Swarm(granting, 2), make_policy(name, granting, 2)
-    percept = swarm.reset(seeds)
-    batched.reset(seeds)
-    observations, _ = env.reset(seed=12)
-    through_env.reset(12)
-    while env.agents:
-        percept = swarm.step(batched.act(percept))
-        observations, *_ = env.step(through_env(observations))
-        assert env.swarm.state.eta[0].tobytes() == swarm.state.eta[1].tobytes()
-        assert env.swarm.facts.arrival_s.tobytes() == swarm.facts.arrival_s[1:].tobytes()
 
 
 def test_observations_are_within_finite_bounds_and_lose_nothing():
@@ -280,38 +259,3 @@ def test_the_last_info_tells_how_it_ended(reason):
     assert alone["ending"] == last["uuv_0"]["ending"]
     if reason == "time_limit":
         assert collisions > 0, "else the test shows nothing"
-
-
-class OneWorld(gymnasium.Env):
-    """A single-agent face of one world, for Gymnasium's forked workers."""
-
-    observation_space = gymnasium.spaces.Box(-1e4, 1e4, (98,))
-    action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,))
-
-    def __init__(self):
-        self.env = uuv_marl.parallel_env(num_vehicles=5)
-
-    def reset(self, *, seed=None, options=None):
-        return self.env.reset(seed=seed)[0]["uuv_0"], {}
-
-    def step(self, action):
-        observations, rewards, *_ = self.env.step(dict.fromkeys(self.env.agents, action))
-        return observations["uuv_0"], rewards["uuv_0"], False, False, {}
-
-
-def test_gymnasium_workers_give_the_same_run():
-    batch = Swarm(load_scenario("single_obstacle", num_vehicles=5), 2)  # threads are running before the fork
-    batch.reset(0)
-    batch.step(np.zeros((2, 5, 2), np.float32))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # Python's own word on forking with threads
-        workers = gymnasium.vector.AsyncVectorEnv([OneWorld, OneWorld], context="fork")
-    here = gymnasium.vector.SyncVectorEnv([OneWorld, OneWorld])
-    actions = np.random.default_rng(0).uniform(-1, 1, (20, 2, 2)).astype(np.float32)
-    runs = []
-    for envs in (workers, here):
-        record = [envs.reset(seed=5)[0].tobytes()]
-        record += [envs.step(action)[0].tobytes() for action in actions]
-        runs.append(record)
-        envs.close()
-    assert runs[0] == runs[1]

@@ -86,14 +86,3 @@ def test_a_shipped_network_is_exported_by_its_name(name, tmp_path, monkeypatch):
     assert said["checkpoint"] == POLICIES[name].checkpoint.digest == load_checkpoint(name).digest
     with pytest.raises(PolicyError, match=r"can't be read"):
         load_checkpoint(f"./{name}")
-
-
-def test_the_command_names_what_it_can_not_export():
-    for policy, told in {
-        "scout": "not controllers",
-        "mapo": "did you mean 'mappo'",
-        "runs/none": "can't be read",
-    }.items():
-        done = CliRunner().invoke(app, ["export", policy, "policy.onnx"])
-        assert done.exit_code == 2
-        assert told in done.output

@@ -399,23 +399,6 @@ def test_large_swarms_have_a_grid_of_bounded_size_and_small_ones_one_cell(layout
         assert (grid.rows, grid.columns) == (1, 1)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
-def test_one_more_lost_vehicle_requires_a_grid_and_changes_nothing(layout):
-    few, more = world("as set", ONE_CELL_UP_TO), world("as set", ONE_CELL_UP_TO + 1)
-    few.state.nu[0] = 0.0
-    fill(few, layout, 7)
-    for ours, theirs in zip(more.state[:4], few.state[:4], strict=True):
-        ours[0, :-1] = theirs[0]
-    more.state.alive[0, -1] = False
-    more.world_map.obstacles[0] = more.state.obstacles_before[0] = few.world_map.obstacles[0]
-    more.observe()
-    np.testing.assert_array_equal(more.detected_index[0, :-1], few.detected_index[0])
-    np.testing.assert_array_equal(more.percept.flat[0, :-1], few.percept.flat[0])
-    np.testing.assert_array_equal(more.facts.spacing[0, :-1], few.facts.spacing[0])
-    np.testing.assert_array_equal(more.facts.vehicle_collisions[0, :-1], few.facts.vehicle_collisions[0])
-    assert more.facts.max_spacing[0] == few.facts.max_spacing[0]
-
-
 def test_a_vehicle_at_rest_at_a_hull_s_radius_from_an_obstacle_never_collides():
     """Where two ways of computing a distance differ by an ulp, an old gap must not count as a new collision."""
     offset = np.random.default_rng(0).uniform(20, 40, (10000, 2))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from uuv_marl import load_scenario, parallel_env
+from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
 from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.envs.core import BatchedEnv
@@ -93,15 +93,6 @@ def test_a_channel_that_the_task_lacks_is_refused_with_the_remedy():
     for name in ("starter", "hard_water"):
         with pytest.raises(PolicyError, match="Oracle needs the channels path and link"):
             make_policy("oracle", load_scenario(name))
-
-
-def test_the_oracle_works_by_observations_alone():
-    scenario = told()
-    env, swarm = parallel_env(scenario), Swarm(scenario)
-    observations, _ = env.reset(seed=FIRST)
-    actions = make_policy("oracle", env)(observations)
-    expected = make_policy("oracle", scenario).act(swarm.reset(FIRST))[0]
-    np.testing.assert_array_equal(np.stack(list(actions.values())), expected)
 
 
 def test_geodesic_progress_is_what_the_way_has_shortened_by():

@@ -69,16 +69,6 @@ def test_a_recording_is_the_benchmarks_run():
     np.testing.assert_allclose(recording.series["centre_error_m"], error, atol=1e-3)
 
 
-def test_watching_changes_nothing():
-    seen = []
-    watched = run_of(quick(), "bio_inspired", 2, lambda swarm, action: seen.append(action is None))
-    alone = run_of(quick(), "bio_inspired", 2)
-    assert watched.metrics == alone.metrics
-    for name, values in alone.series.items():
-        np.testing.assert_array_equal(watched.series[name], values)
-    assert seen == [True] + [False] * (len(alone.series["time_s"]) - 1)
-
-
 def test_inspected_vehicles_show_what_the_engine_recorded():
     scenario = with_policy_requirements("bio_inspired", quick())
     recording = record(scenario, "bio_inspired", 5, inspect=[6, 2, 6])

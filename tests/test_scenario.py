@@ -1,8 +1,6 @@
 """Scenarios: sources, overrides, and errors that name the field, the value and the remedy."""
 
 import re
-import subprocess
-import sys
 from collections import UserDict, deque
 from collections.abc import Sequence
 from decimal import Decimal
@@ -13,9 +11,11 @@ import numpy as np
 import pytest
 
 from tests.conftest import SCENARIOS as LARGE
+from tests.processes import python
 from uuv_marl import load_scenario
 from uuv_marl.scenario import ScenarioError, load_vehicle, parse_override, show, to_toml, vehicle_names
 from uuv_marl.scenario.hardware import Vehicle
+from uuv_marl.sim.swarm import Swarm
 
 FOLDER = resources.files("uuv_marl.scenario")
 BASE = "single_obstacle"
@@ -180,10 +180,40 @@ BAD_SEA = [
 ]
 
 
-@pytest.mark.parametrize(("overrides", "message"), [*BAD, *BAD_SEA])
-def test_bad_values_name_field_value_and_remedy(overrides, message):
+FAST = {"traffic.speed_mps": 2.0, "timing.decision_period_s": 0.1}
+BAD_TASKS = [
+    ("hard_water", {"task.kinds": ["gates"]}, "task.kinds must name some of pocket, bar, .*got .'gates'."),
+    ("hard_water", {"task.kinds": []}, "task.kinds must name some of"),
+    ("hard_water", {"task.gate.gap_m": [20.0, 10.0]}, r"gate.gap_m must be \[low, high\] with low .* got \[20.0, 10.0"),
+    ("hard_water", {"task.bar.hole_m": 3.0}, "task.bar.hole_m is unknown"),
+    ("hard_water", {"task.length_m": [150.0, 400.0]}, r"at least 167, task.first_wall_m and task.goal_clear_m"),
+    ("hard_water", {"task.piles.apart_m": [0.0, 0.0]}, "task.piles.apart_m.0 must lie within 0.001"),
+    ("hard_water", {"task.bar.radius_m": [0.0, 2.0]}, "task.bar.radius_m.0 must lie within 0.001"),
+    ("two_swarms", {"task.gap_aside_m": 100.0}, "must leave a wall on both sides within task.half_width_m .*, got 128"),
+    ("two_swarms", {"task.gap_m": [20.0, 10.0]}, r"task.gap_m must be \[low, high\] with low <= high"),
+    ("two_swarms", {"task.gap_m": [1.0, 2.0]}, r"gap_m must be above 2, twice collision.hull_radius_m, got \[1.0, 2.0"),
+    ("two_swarms", {"task.apart_m": 30.0}, "apart_m must be at least .*, so that groups .* long start before the wall"),
+    ("two_swarms", {"start.width_m": 210.0}, "the groups must start within the banks of task 'two_swarms'"),
+    ("silent_targets", {"task.speed_share": [0.5, 1.5]}, r"speed_share must be at most 1, .* got \[0.5, 1.5\]; lower"),
+    ("silent_targets", {"task.turn_s": [20.0, 10.0]}, r"turn_s must be \[low, high\] with low <= high, got \[20.0, 10"),
+    ("silent_targets", {"task.clear_m": 700.0}, "must be at most half of task.side_m = 1200, got 700; lower it"),
+    ("silent_targets", {"task.targets": 0}, "task.targets must lie within 1 to 1,024, got 0"),
+    ("silent_targets", {"start.width_m": 200.0}, "hold the start, two times 40 x 200 m, got 110; raise it"),
+    ("hard_water", FAST, "traffic.speed_mps must be 0 for task 'hard_water', .* got 2; leave it out"),
+    ("two_swarms", FAST, "traffic.speed_mps must be 0 for task 'two_swarms', .* got 2; leave"),
+    ("starter", FAST | {"traffic.amplitude_m": 0.1}, "must be at least 0.2, .*; raise it or lower the speed"),
+    ("random_field", FAST | {"traffic.amplitude_m": 55.1}, r"at most .* = 55, so .*, got 55.1; lower it"),
+    ("starter", FAST | {"traffic.amplitude_m": 90.0}, "lies on the trajectory's end; keep 95 m"),
+    ("starter", {"traffic.share": 1.5}, "traffic.share must lie within 0 to 1, got 1.5"),
+]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "overrides", "message"), [*((BASE, *bad) for bad in (*BAD, *BAD_SEA)), *BAD_TASKS]
+)
+def test_bad_values_name_field_value_and_remedy(scenario, overrides, message):
     with pytest.raises(ScenarioError, match=message):
-        load_scenario(BASE, overrides=overrides)
+        Swarm(load_scenario(scenario, overrides=overrides))
 
 
 @pytest.mark.parametrize(
@@ -283,24 +313,27 @@ def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
     assert accepted > 5
 
 
-def test_light_commands_import_nothing_heavy():
-    code = (
-        "import sys; from typer.testing import CliRunner; from uuv_marl.baselines import POLICIES\n"
-        "assert not any('checkpoint' in vars(policy) for policy in POLICIES.values()), 'weights were read'\n"
-        "from uuv_marl.cli import app\n"
-        "for what in ('scenarios', 'policies'): assert CliRunner().invoke(app, ['list', what]).exit_code == 0\n"
-        "assert not {'matplotlib', 'scipy.stats'} & set(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
+READ_TWO = "from uuv_marl import load_scenario; load_scenario('starter'); load_scenario('random_field')"
+LIST_ALL = """
+from typer.testing import CliRunner
+from uuv_marl.baselines import POLICIES
+assert not any('checkpoint' in vars(policy) for policy in POLICIES.values()), 'weights were read'
+from uuv_marl.cli import app
+for what in ('scenarios', 'policies'): assert CliRunner().invoke(app, ['list', what]).exit_code == 0
+"""
 
 
-def test_a_scenario_is_read_without_the_simulation():
-    code = (
-        "import sys; from uuv_marl import load_scenario\n"
-        "for name in ('starter', 'random_field'): load_scenario(name)\n"
-        "assert not {'numba', 'scipy'} & set(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
+@pytest.mark.parametrize(
+    ("code", "heavy"),
+    [
+        ("import uuv_marl", {"numba", "torch", "matplotlib", "ray"}),
+        (READ_TWO, {"numba", "scipy"}),
+        (LIST_ALL, {"matplotlib", "scipy.stats"}),
+    ],
+    ids=["import", "load_scenario", "uuv-marl list"],
+)
+def test_light_work_imports_nothing_heavy(code, heavy):
+    python(f"{code}\nimport sys; assert not {heavy!r} & set(sys.modules)")
 
 
 def test_a_scenario_names_its_vehicle_whose_numbers_stand_in_a_file(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import BatchedEnv
-from uuv_marl.errors import PolicyError, ScenarioError
+from uuv_marl.errors import PolicyError
 from uuv_marl.scenario.vehicle_checks import top_speed
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.silent_targets import SilentTargets
@@ -33,19 +33,6 @@ def alone(swarm, away=400.0):
     swarm.state.eta[:, :, 1] = 20.0 * np.arange(n)
     swarm.state.eta[:, :, 2] = 0.0
     swarm.state.nu[:] = 0.0
-
-
-def test_targets_depend_on_their_seed_alone_and_not_on_what_vehicles_do():
-    batch, rng = water(3), np.random.default_rng(0)
-    batch.reset(TUNING)
-    drift(batch, 60)
-    for w in range(3):
-        single = water()
-        single.reset(TUNING + w)
-        for _ in range(60):
-            single.step(0.3 * rng.uniform(-1.0, 1.0, (1, single.num_vehicles, 2)))
-        np.testing.assert_array_equal(single.world_map.obstacles[0], batch.world_map.obstacles[w])
-    assert len(np.unique(batch.world_map.obstacles[:, :, 0])) == 24
 
 
 @pytest.mark.parametrize("tier", TIERS)
@@ -157,19 +144,6 @@ def test_progress_and_pay_count_targets_that_no_nearer_vehicle_holds():
     assert not held[1:].any()
 
 
-def test_a_run_goes_on_alike_from_a_snapshot():
-    swarm = water()
-    swarm.reset(TUNING)
-    drift(swarm, 50)
-    before = swarm.snapshot()
-    drift(swarm, 50)
-    first = swarm.snapshot()
-    swarm.restore(before)
-    drift(swarm, 50)
-    for name, array in swarm.snapshot().items():
-        np.testing.assert_array_equal(array, first[name], err_msg=name)
-
-
 def shares(name, tier, worlds=4):
     scenario = with_policy_requirements(name, load_scenario(tier))
     batch, policy = BatchedEnv(scenario, worlds), make_policy(name, scenario, worlds)
@@ -210,15 +184,3 @@ def test_every_gain_of_the_search_can_be_given_by_name_and_counts():
 def test_the_search_refuses_what_has_no_box():
     with pytest.raises(PolicyError, match="searches a box, which task 'follow' does not have; run it on silent"):
         make_policy("nearest_target", with_policy_requirements("nearest_target", load_scenario("starter")))
-
-
-@pytest.mark.parametrize(("changes", "message"), [
-    ({"task.speed_share": [0.5, 1.5]}, r"task.speed_share must be at most 1, .* got \[0.5, 1.5\]; lower it"),
-    ({"task.turn_s": [20.0, 10.0]}, r"task.turn_s must be \[low, high\] with low <= high, got \[20.0, 10.0\]"),
-    ({"task.clear_m": 700.0}, "task.clear_m must be at most half of task.side_m = 1200, got 700; lower it"),
-    ({"task.targets": 0}, "task.targets must lie within 1 to 1,024, got 0"),
-    ({"start.width_m": 200.0}, "task.clear_m must hold the start, two times 40 x 200 m, got 110; raise it"),
-])  # fmt: skip
-def test_numbers_that_can_not_be_are_refused(changes, message):
-    with pytest.raises(ScenarioError, match=message):
-        water(**changes)

@@ -112,16 +112,6 @@ def test_two_hulls_head_on_share_their_momentum():
     assert swarm.facts.vehicle_collisions[0].tolist() == [1, 1]
 
 
-def test_a_drifting_disc_carries_a_hull_along():
-    swarm = two((22.0, 0.0, 0.0), (300.0, 0.0, 0.0))
-    swarm.world_map.obstacle_velocity[0, 0] = (2.0, 0.0)
-    for _ in range(50):
-        swarm.step(NOTHING)
-        swarm.world_map.obstacle_velocity[0, 0] = (2.0, 0.0)
-    assert swarm.state.nu[0, 0, 0] == pytest.approx(2.0, abs=0.05)
-    assert swarm.facts.clearance[0, 0] >= 0.99
-
-
 def test_off_is_as_before():
     on, off = (two((-30.0, 1.0, 0.0), (300.0, 0.0, 0.0), **{"collision.stops": stops}) for stops in (True, False))
     for k in range(100):

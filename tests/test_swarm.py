@@ -1,7 +1,6 @@
 """Swarm: seeds, batches, endings, losses, collisions, and random fields."""
 
 import math
-import multiprocessing
 import os
 import pickle
 import subprocess
@@ -90,14 +89,6 @@ def test_an_error_of_any_thread_is_raised_once_all_have_ended():
         on_threads(work, 10, 3)
     assert sorted(ended) == [0, 2]
     assert not on_threads(lambda thread, begin, end: begin > 9, 10, 7)
-
-
-def test_another_process_gives_the_same_run():
-    scenario = load_scenario("single_obstacle")
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        theirs = pool.apply(play, (scenario, range(2), 50))
-    ours = play(scenario, range(2), 50)
-    assert all(a.tobytes() == b.tobytes() for a, b in zip(theirs, ours, strict=True))
 
 
 FORKED = """

@@ -14,7 +14,7 @@ from uuv_marl.scenario.hardware import CHANNEL_NAMES
 from uuv_marl.sim import entry_points
 from uuv_marl.sim.arrays import Facts, Senses, State, WorldMap
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.tables import Bounds, allocate, array_specs, check
+from uuv_marl.sim.tables import allocate, array_specs
 from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, obstacle_columns, workspace, workspace_buffers
 from uuv_marl.types import Float32
 
@@ -70,22 +70,6 @@ def test_a_table_documents_shapes_types_and_meaning():
 
 def test_a_scenario_accepts_the_channels_that_add_fields():
     assert CHANNELS == CHANNEL_NAMES
-
-
-@pytest.mark.parametrize(
-    ("low", "axis", "beyond", "wrong"), [(0, "vehicle", 0, 5), (-1, "vehicle", 0, -2), (1, "point", 1, 4)]
-)
-def test_numbers_that_compiled_code_takes_unchecked_have_bounds(low, axis, beyond, wrong, monkeypatch):
-    arrays = allocate(WorldMap, SIZES)._asdict()
-    arrays["last"][:] = 1
-    check(WorldMap, arrays, SIZES)
-    monkeypatch.setattr(
-        "uuv_marl.sim.tables.array_specs",
-        lambda table: {"last": array_specs(table)["last"]._replace(bounds=Bounds(low, axis, beyond))},
-    )
-    arrays["last"][1] = wrong
-    with pytest.raises(ValueError, match="last must lie within"):
-        check(WorldMap, arrays, SIZES)
 
 
 def test_the_compiled_types_are_the_same_for_all_scenarios():

@@ -86,18 +86,3 @@ def test_more_walls_than_it_has_room_for_take_the_place_of_the_oldest():
     assert num[0, 0] == room
     assert set(heard) == {room - 1, *range(len(heard) - 1)}
     assert following[0, 0] == len(heard) - 1 > 1
-
-
-def test_it_decides_the_same_twice_and_forgets_at_a_reset():
-    scenario = water(POCKET)
-    swarm, policy, places = fly("tangent_bug", scenario, steps=60)
-    before = policy.snapshot()
-    np.testing.assert_array_equal(policy.act(swarm.percept), policy.act(swarm.percept))
-    assert policy.memory.num[0, 0] > 5
-    assert policy.memory.side[0, 0] != 0.0
-    policy.reset(0)
-    assert not any(array.any() for array in policy.memory)
-    policy.restore(before)
-    assert policy.memory.num[0, 0] > 5
-    _, _, again = fly("tangent_bug", scenario, steps=60)
-    np.testing.assert_array_equal(places, again)

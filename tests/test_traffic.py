@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 
 import uuv_marl
 from uuv_marl import load_scenario
-from uuv_marl.benchmark.robustness.axes import overrides
 from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
-from uuv_marl.scenario import ScenarioError, conditions
+from uuv_marl.scenario import conditions
 from uuv_marl.sim.stopping import SINK_M
 from uuv_marl.sim.swarm import Swarm
 
@@ -96,15 +95,6 @@ def test_the_seed_decides_which_move_and_where():
     assert len(movers) > 2
 
 
-@pytest.mark.parametrize("name", ["random_field", "lossy"])
-def test_all_other_random_numbers_stay(name):
-    still, moving = (swarm(name, speed, **{"swarm.num_vehicles": 9}) for speed in (0.0, 3.0))
-    for table in ("eta", "nu"):
-        np.testing.assert_array_equal(getattr(still.state, table), getattr(moving.state, table))
-    for table in ("waypoints", "obstacles", "losses"):
-        np.testing.assert_array_equal(getattr(still.world_map, table), getattr(moving.world_map, table))
-
-
 @pytest.mark.parametrize("off", [{"speed_mps": 0.0, "amplitude_m": 3.0, "share": 0.5}, {"share": 0.0}])
 def test_off_is_as_if_there_were_no_such_section(off):
     bare, made = Swarm(load_scenario("starter", overrides=FINE)), swarm(**off)
@@ -182,23 +172,6 @@ def test_a_hull_that_is_pushed_keeps_at_the_surface_and_is_left_behind():
 # --- Determinism ---
 
 
-def test_a_batch_and_a_snapshot_give_the_same_run():
-    changes = {"collision.stops": True, "traffic.share": 0.5}
-    many = swarm("random_field", worlds=8, seed=5, **changes)
-    one = swarm("random_field", seed=8, **changes)
-    for made in (many, one):
-        go(made, 33)
-    other = swarm("random_field", seed=99, **changes)
-    other.restore(one.snapshot())
-    for made in (many, one, other):
-        go(made, 90)
-    assert one.world_map.swing_control_steps[0].any()
-    for made, w in ((many, 3), (other, 0)):
-        np.testing.assert_array_equal(made.state.eta[w], one.state.eta[0])
-        np.testing.assert_array_equal(discs(made, w), discs(one))
-        np.testing.assert_array_equal(made.world_map.obstacle_velocity[w], one.world_map.obstacle_velocity[0])
-
-
 def test_interfaces_agree_and_the_global_state_has_the_velocity():
     made = scenario("multi_obstacle")
     parallel, vector = uuv_marl.parallel_env(made), uuv_marl.vector_env(2, made)
@@ -217,44 +190,10 @@ def test_interfaces_agree_and_the_global_state_has_the_velocity():
 # --- Errors, headers and replays ---
 
 
-@pytest.mark.parametrize(
-    ("name", "changes", "message"),
-    [
-        ("hard_water", {}, "traffic.speed_mps must be 0 for task 'hard_water', .* got 2; leave it out"),
-        (
-            "two_swarms",
-            {"swarm.num_vehicles": 10},
-            "traffic.speed_mps must be 0 for task 'two_swarms', .* got 2; leave",
-        ),
-        (
-            "starter",
-            {"amplitude_m": 0.1},
-            "traffic.amplitude_m must be at least 0.2, .* got 0.1; raise it or lower the speed",
-        ),
-        (
-            "random_field",
-            {"amplitude_m": 55.1},
-            r"traffic.amplitude_m must be at most .* = 55, so .*, got 55.1; lower it",
-        ),
-        ("starter", {"amplitude_m": 90.0}, "lies on the trajectory's end; keep 95 m"),
-        ("starter", {"share": 1.5}, "traffic.share must lie within 0 to 1, got 1.5"),
-    ],
-)
-def test_errors_name_field_value_and_remedy(name, changes, message):
-    changes = {**changes, **({"swarm.num_vehicles": 10} if name == "hard_water" else {})}
-    with pytest.raises(ScenarioError, match=message):
-        scenario(name, **changes)
-
-
 def test_headers_name_it_and_it_needs_no_disturbances():
     made = swarm(share=0.5)
     assert conditions(made.scenario) == "0.5 of obstacles move at 2 m/s, amplitude 8 m"
     assert made.currents is None
-
-
-def test_the_suite_s_axis_is_one_to_five_metres_a_second():
-    levels = [overrides("W4", level, "random_field")["traffic.speed_mps"] for level in range(1, 6)]
-    assert levels == [1.0, 2.0, 3.0, 4.0, 5.0]
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,27 @@
+"""Python in processes of its own, and the command ``uuv-marl`` in this one."""
+
+import os
+import subprocess
+import sys
+
+from typer.testing import CliRunner
+
+from uuv_marl.cli import app
+
+
+def python(code, *arguments, folder=None, **environment):
+    """What an interpreter prints that runs the code with warnings shown; it must succeed."""
+    done = subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)], cwd=folder, env={**os.environ, **environment},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def uuv_marl(*words):
+    """The exit status, and the output on one line without the frames of tables."""
+    done = CliRunner().invoke(app, [*map(str, words)])
+    if done.exception and not isinstance(done.exception, SystemExit):
+        raise done.exception
+    return done.exit_code, " ".join(done.output.replace("│", " ").split())
