@@ -6,7 +6,16 @@ import sys
 
 from typer.testing import CliRunner
 
+from uuv_marl import load_scenario
 from uuv_marl.cli import app
+
+QUICK = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0, "swarm.num_vehicles": 8}
+SETS = [f"--set={field}={value}" for field, value in QUICK.items()]
+"""Episodes of seconds, in Python and on the command line."""
+
+
+def quick(name="single_obstacle", **changes):
+    return load_scenario(name, overrides={**QUICK, **changes})
 
 
 def python(code, *arguments, folder=None, **environment):
@@ -19,7 +28,7 @@ def python(code, *arguments, folder=None, **environment):
     return done.stdout
 
 
-def uuv_marl(*words):
+def cli(*words):
     """The exit status, and the output on one line without the frames of tables."""
     done = CliRunner().invoke(app, [*map(str, words)])
     if done.exception and not isinstance(done.exception, SystemExit):

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from research.episodes import read_rows
 from tests.golden import STARTER
 from tests.nets import ANYWHERE, saved
+from tests.swarms import fly, piloted
 from uuv_marl import load_scenario, parallel_env, scenario_names
 from uuv_marl.baselines import POLICIES, Policy, PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.making import policy_requirements
@@ -63,9 +64,7 @@ def written_as_in_the_paper(percept, gains, limits):
 @settings(max_examples=15)
 @given(st.integers(0, 1000))
 def test_the_controller_is_equations_18_to_22(seed):
-    scenario = load_scenario("single_obstacle")
-    swarm, policy = Swarm(scenario), make_policy("bio_inspired", scenario)
-    swarm.reset(seed)
+    swarm, policy = piloted("bio_inspired", "single_obstacle", seed=seed)
     swarm.state.eta[0, :, :2] += 150.0  # before and beside the obstacle
     percept = swarm.observe()
     action = policy.act(percept)
@@ -79,13 +78,11 @@ def test_the_controller_is_equations_18_to_22(seed):
 @pytest.mark.parametrize("name", [*(name for name in ANYWHERE if name != "random"), "mappo,safety_filter=true"])
 def test_forces_turn_with_the_world(name):
     """Body-frame actions don't change, up to float32, when the world is rotated and moved."""
-    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=20))
     turn, (x, y) = 0.7, (50.0, -80.0)
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     actions = []
     for moved in (False, True):
-        swarm, policy = Swarm(scenario), make_policy(name, scenario)
-        swarm.reset(3)
+        swarm, policy = piloted(name, "single_obstacle", seed=3, n=20)
         swarm.state.eta[0, :, :2] += 150.0
         if moved:
             swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (x, y)
@@ -105,11 +102,9 @@ def test_forces_turn_with_the_world(name):
 @pytest.mark.parametrize("name", [name for name in ANYWHERE if name != "random"])
 def test_who_a_vehicle_is_does_not_matter(name):
     """Vehicles that swap their places swap their actions."""
-    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=20))
     order, actions = np.random.default_rng(0).permutation(20), []
     for places in (np.arange(20), order):
-        swarm, policy = Swarm(scenario), make_policy(name, scenario)
-        swarm.reset(3)
+        swarm, policy = piloted(name, "single_obstacle", seed=3, n=20)
         swarm.state.eta[0, :, :2] += 150.0
         swarm.state.eta[0], swarm.state.nu[0] = swarm.state.eta[0, places], swarm.state.nu[0, places]
         actions.append(policy.act(swarm.observe())[0])
@@ -161,6 +156,7 @@ def test_slots_are_a_lattice_around_zero(n):
         np.testing.assert_allclose(away.min(axis=1), sdc.SLOT_PITCH_M)
 
 
+WITH_MEMORY = ["sff", "sdc", "scout", "tangent_bug", "sff,safety_filter=true"]
 FOLDER = resources.files("uuv_marl.baselines") / "tuned"
 TRIED = Path(__file__).resolve().parent.parent / "research" / "tuned"
 
@@ -182,19 +178,15 @@ def test_tuned_gains_come_from_shipped_trials(file):
     assert {key: numbers[key] for key in data["best"]} == data["best"]
 
 
-def flown(name, scenario, decisions=6, worlds=2):
-    scenario = with_policy_requirements(name, load_scenario(scenario))
-    swarm, policy = Swarm(scenario, worlds), make_policy(name, scenario, worlds)
-    percept = swarm.reset(0)
+def flown(name):
+    swarm, policy = piloted(name, STARTER, worlds=2)
     policy.reset(0)
-    for _ in range(decisions):
-        percept = swarm.step(policy.act(percept))
-    return swarm, policy, percept
+    return swarm, policy, fly(swarm, policy, 6)
 
 
 @pytest.mark.parametrize("name", [*ANYWHERE, "mappo,safety_filter=true"])
 def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
-    swarm, policy, percept = flown(name, STARTER)
+    swarm, policy, percept = flown(name)
     again, kept, water = pickle.loads(pickle.dumps(policy)), policy.snapshot(), swarm.snapshot()
     first = policy.act(percept)
     assert np.array_equal(again.act(percept), first)
@@ -207,9 +199,9 @@ def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
         policy.restore({**kept, "clamps": np.zeros(5)})
 
 
-@pytest.mark.parametrize("name", ["sff", "sdc", "scout", "sff,safety_filter=true"])
+@pytest.mark.parametrize("name", WITH_MEMORY)
 def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
-    swarm, policy, percept = flown(name, STARTER)
+    swarm, policy, percept = flown(name)
     first = policy.act(percept)
     assert np.array_equal(policy.act(percept), first), "asked twice at one time, it must say the same"
     swarm.step(first)
@@ -220,10 +212,10 @@ def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
     policy.act(swarm.percept)
 
 
-@pytest.mark.parametrize("name", ["sff", "sdc", "scout", "sff,safety_filter=true"])
+@pytest.mark.parametrize("name", WITH_MEMORY)
 def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
     """So that memory does not outlive an autoreset, whichever API did it; the other world keeps its own."""
-    swarm, policy, percept = flown(name, STARTER)
+    swarm, policy, percept = flown(name)
     before = [array[1].copy() for array in policy.memory]
     percept = swarm.reset([5], worlds=[0])
     action = policy.act(percept)
@@ -335,7 +327,8 @@ def test_a_policy_that_acts_by_a_vehicles_index_declares_it(name):
     assert policy_requirements(name).identity == (not acted_alike and name != "random")
 
 
-def test_a_network_around_a_law_that_acts_by_the_index_does_so_too(tmp_path):
-    for law, told in {"nearest_target,lanes=true": True, "nearest_target,lanes=false": False}.items():
-        checkpoint = saved(tmp_path, load_scenario("silent_targets"), base_controller=law)
-        assert policy_requirements(checkpoint).identity is told
+@pytest.mark.parametrize("lanes", [True, False])
+def test_a_network_around_a_controller_that_acts_by_the_index_does_so_too(lanes, tmp_path):
+    controller = f"nearest_target,lanes={str(lanes).lower()}"
+    checkpoint = saved(tmp_path, load_scenario("silent_targets"), base_controller=controller)
+    assert policy_requirements(checkpoint).identity is lanes

@@ -169,8 +169,7 @@ def test_the_process_has_its_mean_variance_and_memory_whatever_the_step(control_
     tau = 3.0
     overrides = {"current.variation_mps": 0.4, "current.variation_time_s": tau, "timing.control_step_s": control_step_s,
                  "timing.decision_period_s": control_step_s}  # fmt: skip
-    swarm = Swarm(load_scenario(STARTER, overrides=overrides), num_worlds=1)
-    swarm.reset(0)
+    swarm = started(STARTER, overrides)
     disturbances = swarm._disturbances
     steps = round(6.0 / control_step_s)
     first, last = [], []
@@ -286,8 +285,7 @@ def test_a_larger_share_has_the_smaller_one_s_victims(a, b, key):
 
 
 def test_faults_act_from_their_onset_for_their_duration():
-    swarm = Swarm(load_scenario(STARTER, overrides=FAULTS))
-    swarm.reset(0)
+    swarm = started(STARTER, FAULTS)
     victim = [set(np.flatnonzero(swarm._disturbances.hull.broken[0, :, f, 0] < 10**6).tolist()) for f in range(3)]
     assert [len(each) for each in victim] == [2, 2, 1]
     for hold in range(25):

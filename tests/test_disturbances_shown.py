@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.golden import STARTER
+from tests.swarms import started
 from tests.test_replay_page import node
 from uuv_marl import load_scenario
 from uuv_marl.benchmark import runner
@@ -19,7 +20,6 @@ from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
 from uuv_marl.replay.traces import from_trace
-from uuv_marl.sim.swarm import Swarm
 
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
 FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])
@@ -28,9 +28,8 @@ FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])
 
 def carried(decisions=30):
     """The same actions in still water and in a current, which moves no bit of headings and velocities through it."""
-    swarms = [Swarm(load_scenario(STARTER, overrides=change)) for change in ({"obstacles": []}, CURRENT)]
+    swarms = [started(STARTER, change, seed=3) for change in ({"obstacles": []}, CURRENT)]
     for swarm in swarms:
-        swarm.reset(3)
         rng = np.random.default_rng(7)
         for _ in range(decisions):
             swarm.step(rng.uniform(-1.0, 1.0, (1, 5, 2)))
@@ -80,8 +79,7 @@ def sailed():
 def test_a_recording_tells_the_water_at_every_vehicle(sailed):
     """Whose velocity over ground is that of the water once it does nothing."""
     field = Scenes(sailed).at(5.0).water
-    swarm = Swarm(sailed.scenario)
-    swarm.reset(0)
+    swarm = started(sailed.scenario)
     for _ in range(50):
         swarm.step(np.zeros((1, 5, 2)))
     np.testing.assert_allclose(field.at(swarm.state.eta[0, :, :2]), swarm.flow[0], atol=1e-6)

@@ -8,11 +8,11 @@ import pytest
 from scipy.stats import kstest, norm
 
 import uuv_marl
+from tests.swarms import started
 from uuv_marl import load_scenario
 from uuv_marl.scenario import sonar_is_ideal
 from uuv_marl.sim.disturbances.noise import is_silent
 from uuv_marl.sim.disturbances.schedule import Reading, control_step_of, due, latest
-from uuv_marl.sim.swarm import Swarm
 
 CHANNELS = {"sonar.channels": ["compass", "link", "age", "ranged"]}
 SONAR = ("detected", "neighbour", "echo", "echo_range", "echo_position", "link_identity")
@@ -49,10 +49,9 @@ def near_obstacles(swarm):
     swarm.observe()
 
 
-def swim(overrides, decisions=40, seed=3, num_vehicles=12, scenario="single_obstacle", idle=False):
+def swim(overrides, decisions=40, num_vehicles=12, scenario="single_obstacle", idle=False):
     """A run with actions that don't depend on disturbances: observed and true values at every decision."""
-    swarm = Swarm(load_scenario(scenario, num_vehicles=num_vehicles, overrides=CHANNELS | overrides))
-    swarm.reset(seed)
+    swarm = started(scenario, CHANNELS | overrides, seed=3, n=num_vehicles)
     if swarm.world_map.num_obstacles[0]:
         near_obstacles(swarm)
     rng, frames = np.random.default_rng(7), []
@@ -249,8 +248,7 @@ def test_a_passive_range_has_a_factor_that_lasts():
             scale = factor[:, None, None] if array.kind == "passive" else 1.0
             expected = scale * theirs["neighbour"][:, sectors]
             np.testing.assert_allclose(ours["neighbour"][:, sectors], expected, rtol=1e-5)
-    drawn = Swarm(load_scenario("single_obstacle", overrides=FACTOR), 200)
-    drawn.reset(0)
+    drawn = started("single_obstacle", FACTOR, worlds=200)
     is_normal(np.log(drawn._disturbances.sensor_errors.factor.ravel()) / 0.3, 10_000)
 
 
@@ -292,8 +290,7 @@ def test_the_probability_of_detection_falls_with_range_as_given():
 @pytest.mark.parametrize(("probability", "length"), [(0.3, 20), (0.05, 5), (0.1, 1), (1.0, 3)])
 def test_outages_have_the_given_rate_and_length(probability, length):
     overrides = {"noise.silence_probability": probability, "noise.silence_readings": length}
-    swarm = Swarm(load_scenario("starter", num_vehicles=1, overrides=overrides))
-    swarm.reset(0)
+    swarm = started("starter", overrides, n=1)
     own, num, silent_at = swarm._disturbances, 100_000, getattr(is_silent, "py_func", is_silent)
     silent = np.array(
         [silent_at(Reading(0, 1, m, m, 0), 0, own.keys[0], own.noise, own.sensor_errors) for m in range(num)]
@@ -323,8 +320,7 @@ def test_a_silent_array_detects_nothing_and_the_others_all():
 @pytest.mark.parametrize("probability", [0.02, 0.2])
 def test_false_echoes_have_their_rate_and_fill_their_sub_sectors(probability):
     overrides = CHANNELS | {"obstacles": [], "noise.false_echo_probability": probability}
-    swarm = Swarm(load_scenario("starter", num_vehicles=1, overrides=overrides))
-    swarm.reset(0)
+    swarm = started("starter", overrides, n=1)
     frames = []
     for _ in range(5000):
         swarm.step(np.zeros((1, 1, 2)))
@@ -439,12 +435,9 @@ def test_a_compass_has_a_constant_bias():
             np.testing.assert_allclose(ours[name].astype(float) @ [1, 1j], expected, atol=1e-4)
         same(ours, theirs)
     np.testing.assert_allclose(angles, np.broadcast_to(angles[0], np.shape(angles)), atol=1e-6)
-    drawn = Swarm(load_scenario("single_obstacle", overrides=COMPASS), 200)
-    drawn.reset(0)
-    is_normal(
-        np.arctan2(*np.moveaxis(drawn._disturbances.navigation_errors.bias, -1, 0)[::-1]).ravel() / math.radians(10.0),
-        10_000,
-    )
+    drawn = started("single_obstacle", COMPASS, worlds=200)
+    bias = polar(drawn._disturbances.navigation_errors.bias)[1]
+    is_normal(bias.ravel() / math.radians(10.0), 10_000)
 
 
 def test_drift_displaces_compensated_readings():

@@ -4,12 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from tests.processes import cli
+from tests.swarms import started
 from tests.test_rendering import SIZE, played
 from tests.test_tasks import TWO
 from uuv_marl import load_scenario
-from uuv_marl.cli import app
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import aim
 from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
@@ -19,7 +19,6 @@ from uuv_marl.replay.encode import payload
 from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
 from uuv_marl.replay.traces import from_folder
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.groups import groups_of
 
 SHORT = {"time_limit.factor": 0.02, "time_limit.extra_s": 6.0}
@@ -112,15 +111,12 @@ def test_one_group_of_informed_vehicles_is_drawn_as_ever(few):
 @pytest.mark.parametrize("name", ["two_swarms", "few_informed_easy"])
 def test_recordings_traces_and_pages_know_the_groups(name, tmp_path):
     sets = [f"--set={field}={value}" for field, value in SHORT.items()]
-    ran = CliRunner().invoke(
-        app, ["benchmark", "--scenario", name, "--policy", "idle", "--seeds", "1", "--output", str(tmp_path), *sets]
-    )
-    assert ran.exit_code == 0, ran.output
+    words = ["--scenario", name, "--policy", "idle", "--seeds", 1, "--output", tmp_path, *sets]
+    assert cli("benchmark", *words)[0] == 0
     whole, trace = record(load_scenario(name, overrides=SHORT), "idle", 0), from_folder(tmp_path, name, "idle", 0)
     at = np.searchsorted(whole.time_s, trace.time_s)
     np.testing.assert_array_equal(trace.references, whole.references[at])
-    swarm = Swarm(whole.scenario)
-    swarm.reset(0)
+    swarm = started(whole.scenario)
     for one in (whole, trace, Scenes(whole).at(3.0)):
         for got, wanted in zip(one.groups[:2], groups_of(swarm)[:2], strict=True):
             np.testing.assert_array_equal(got, wanted)

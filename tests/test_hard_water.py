@@ -4,17 +4,16 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
-from uuv_marl import load_scenario
+from tests.swarms import started
 from uuv_marl.errors import ScenarioError
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cells, reached
 from uuv_marl.tasks.maps.kinds import KINDS
 
 SEEDS = range(8)
 
 
-def water(kind, worlds=1, **changes):
-    return Swarm(load_scenario("hard_water", overrides={"task.kinds": [kind], **changes}), worlds)
+def water(kind, **changes):
+    return started("hard_water", {"task.kinds": [kind], **changes})
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -66,7 +65,6 @@ def test_free_cells_and_ways_are_those_of_brute_force():
 def test_there_is_along_the_free_way():
     """Behind a wall a vehicle may be near the goal, and is not there."""
     swarm = water("gate", **{"task.near_m": 60.0})
-    swarm.reset(0)
     task, goal = swarm.task, swarm.world_map.waypoints[0, 0, 1]
     swarm.state.eta[0, :, :2] = goal + 4.0 * np.arange(10)[:, None]
     swarm.observe()
@@ -79,4 +77,4 @@ def test_knobs_that_leave_no_way_are_refused_with_the_remedy():
     with pytest.raises(
         ScenarioError, match="of gate, none of them with a path at task.clearance_m = 3; widen the gaps"
     ):
-        water("gate", **{"task.gate.gap_m": [1.0, 2.0]}).reset(0)
+        water("gate", **{"task.gate.gap_m": [1.0, 2.0]})

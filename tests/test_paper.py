@@ -3,15 +3,11 @@
 import numpy as np
 import pytest
 
-from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.benchmark.evaluate import episodes
+from uuv_marl import evaluate
 
 
 def over_seeds(scenario, policy="bio_inspired"):
-    loaded = with_policy_requirements(policy, load_scenario(scenario))
-    runs = [run.metrics for run in episodes(loaded, policy, list(range(20)))]
-    assert len(runs) == 20
+    runs = evaluate(policy, scenario, range(20))
     return {name: [run[name] for run in runs] for name in runs[0]}
 
 

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+from tests.swarms import fly, piloted
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.policy import Limits, Policy
@@ -13,7 +14,6 @@ from uuv_marl.baselines.requirements import inner_loop_nms
 from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
 from uuv_marl.baselines.steering import steer
 from uuv_marl.percept import Percept, PerceptLayout
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.training import overrides_for
 
 
@@ -81,12 +81,9 @@ def test_to_a_wished_velocity_a_rudder_turns_by_the_angle_whatever_the_hull_slip
 
 @pytest.mark.parametrize("name", ["lauv", "remus100"])
 def test_torpedoes_pass_an_obstacle_without_a_collision(name):
-    scenario = with_policy_requirements("scout", with_vehicle(name, num_vehicles=12))
-    swarm, actor = Swarm(scenario), make_policy("scout", scenario)
-    percept, collisions = swarm.reset(10_000), 0
-    actor.reset(10_000)
+    (swarm, policy), collisions = piloted("scout", with_vehicle(name, num_vehicles=12), seed=10_000), 0
     while not swarm.ended[0]:
-        percept = swarm.step(actor.act(percept))
+        fly(swarm, policy, 1)
         collisions += int(swarm.facts.collisions[0])
     assert swarm.arrived[0]
     assert collisions == 0

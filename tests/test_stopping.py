@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uuv_marl import load_scenario
-from uuv_marl.sim.swarm import Swarm
+from tests.swarms import started
 from uuv_marl.sim.vehicle import Plant
 
 STOPS = {"collision.stops": True, "obstacles": [{"centre_m": [0.0, 0.0], "radius_m": 20.0}]}
@@ -16,8 +15,7 @@ NOTHING = np.zeros((1, 2, 2))
 
 def two(first, second, *, nu=((0.0, 0.0, 0.0),) * 2, **changes):
     """Two vehicles at these poses, the disc of 20 m around the origin."""
-    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=2, overrides={**STOPS, **changes}))
-    swarm.reset(0)
+    swarm = started("single_obstacle", {**STOPS, **changes}, n=2)
     swarm.state.eta[0], swarm.state.nu[0] = np.array([first, second]), np.array(nu)
     swarm.observe()
     return swarm

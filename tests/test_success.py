@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import uuv_marl
+from tests.swarms import started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
 from uuv_marl.envs.core import BatchedEnv
-from uuv_marl.sim.swarm import Swarm
 
 SPREAD_M = 80.0
 WORLD = np.ones(1, np.bool_)
@@ -19,8 +19,7 @@ class Story:
     """A hand-made episode: what each moment of it says is written, and nothing is simulated."""
 
     def __init__(self, n, **overrides):
-        self.swarm = Swarm(load_scenario("single_obstacle", num_vehicles=n, overrides=overrides))
-        self.swarm.reset(0)
+        self.swarm = started("single_obstacle", overrides, n=n)
         self.recorder = SuccessRecorder(self.swarm)
         self.recorder.update(WORLD)
 
@@ -117,11 +116,8 @@ def test_faulty_vehicles_count_in_nobodys_done_but_in_what_others_touch():
 
 
 def test_a_fault_counts_from_the_hold_in_which_it_acts():
-    scenario = load_scenario(
-        "single_obstacle", overrides={"faults": [{"kind": "array", "array": "bow", "share": 0.1, "onset_s": 0.3}]}
-    )
-    swarm = Swarm(scenario)
-    swarm.reset(0)
+    fault = {"kind": "array", "array": "bow", "share": 0.1, "onset_s": 0.3}
+    swarm = started("single_obstacle", {"faults": [fault]})
     counts = []
     for _ in range(6):
         counts.append(int(swarm.faulty.sum()))

@@ -8,12 +8,12 @@ import pytest
 from typing_extensions import TypeAliasType
 
 from tests.golden import STARTER
+from tests.swarms import started
 from uuv_marl import load_scenario
 from uuv_marl.percept import CHANNELS
 from uuv_marl.scenario.hardware import CHANNEL_NAMES
 from uuv_marl.sim import entry_points
 from uuv_marl.sim.arrays import Facts, Senses, State, WorldMap
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import allocate, array_specs
 from uuv_marl.sim.workspace import MOST_NEARBY, TABLES, Workspace, obstacle_columns, workspace, workspace_buffers
 from uuv_marl.types import Float32
@@ -89,8 +89,7 @@ def test_the_compiled_types_are_the_same_for_all_scenarios():
     for name, change in changes:
         scenario = load_scenario(name, **change)
         for worlds in (1, 2):
-            swarm = Swarm(scenario, worlds)
-            swarm.reset(0)
+            swarm = started(scenario, worlds=worlds)
             swarm.step(np.zeros((worlds, swarm.num_vehicles, 2)))
     for function in (entry_points.observe, entry_points.step_worlds):
         assert len(function.signatures) == 2, "one without disturbances, one with them"

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import uuv_marl
+from tests.swarms import started
 from uuv_marl import load_scenario
 from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
 from uuv_marl.scenario import conditions
 from uuv_marl.sim.stopping import SINK_M
-from uuv_marl.sim.swarm import Swarm
 
 HOLD_S, N = 0.1, 3
 FINE = {"timing.decision_period_s": HOLD_S, "swarm.num_vehicles": N}
@@ -28,9 +28,7 @@ def scenario(name="starter", speed_mps=2.0, amplitude_m=8.0, share=1.0, **change
 
 
 def swarm(*args, worlds=1, seed=0, **changes):
-    made = Swarm(scenario(*args, **changes), worlds)
-    made.reset(seed)
-    return made
+    return started(scenario(*args, **changes), worlds=worlds, seed=seed)
 
 
 def go(made, steps=1):
@@ -97,8 +95,7 @@ def test_the_seed_decides_which_move_and_where():
 
 @pytest.mark.parametrize("off", [{"speed_mps": 0.0, "amplitude_m": 3.0, "share": 0.5}, {"share": 0.0}])
 def test_off_is_as_if_there_were_no_such_section(off):
-    bare, made = Swarm(load_scenario("starter", overrides=FINE)), swarm(**off)
-    bare.reset(0)
+    bare, made = started("starter", FINE), swarm(**off)
     assert conditions(made.scenario) == conditions(bare.scenario)
     for _ in range(50):
         go(bare)

@@ -9,12 +9,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from research.dynamics import acceptance
+from tests.swarms import fly, piloted, started
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.benchmark import handling
 from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, vehicle_names
 from uuv_marl.scenario.turning import turning_radius
-from uuv_marl.sim.swarm import Swarm
 
 SLOW = {"trajectory.speed_mps": 1.0, "start.speed_max_mps": 1.0, "timing.integration_step_s": 0.0125}
 
@@ -114,11 +113,7 @@ def fossen(source, asked):
 @pytest.mark.parametrize(("name", "source"), [("lauv", Lauv), ("remus100", Remus)])
 def test_a_minute_of_a_steady_turn_is_scipys(name, source):
     """Full thrust and half the rudder to starboard, from rest, lags included."""
-    scenario = load_scenario(
-        "tracking", num_vehicles=1, overrides=SLOW | {"vehicle": name, "timing.integration_step_s": 0.01}
-    )
-    swarm = Swarm(scenario)
-    swarm.reset(0)
+    swarm = started("tracking", SLOW | {"vehicle": name, "timing.integration_step_s": 0.01}, n=1)
     swarm.state.eta[...] = swarm.state.nu[...] = 0.0
     for _ in range(600):
         swarm.step(np.array([[[1.0, 0.5]]], np.float32))
@@ -137,14 +132,10 @@ def test_a_minute_of_a_steady_turn_is_scipys(name, source):
 @pytest.mark.parametrize("name", handling.every())
 def test_every_vehicle_and_variant_runs_and_is_shown(name, tmp_path):
     changes = SLOW | {"vehicle": name, "trajectory.speed_mps": 0.5}
-    scenario = with_policy_requirements(
-        "bio_inspired_plus", load_scenario("single_obstacle", num_vehicles=4, overrides=changes)
-    )
+    swarm, policy = piloted("bio_inspired_plus", "single_obstacle", changes, n=4)
+    scenario = swarm.scenario
     assert scenario.vehicle.name == name
-    swarm, policy = Swarm(scenario), make_policy("bio_inspired_plus", scenario)
-    percept = swarm.reset(0)
-    for _ in range(20):
-        percept = swarm.step(policy.act(percept))
+    fly(swarm, policy, 20)
     assert np.isfinite(swarm.state.eta).all()
     assert (swarm.state.nu[0, :, 0] > 0.0).any()
     (tmp_path / "again.toml").write_text(to_toml(scenario))
