@@ -1,5 +1,6 @@
 """Python in processes of its own, and the command ``uuv-marl`` in this one."""
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -16,6 +17,14 @@ SETS = [f"--set={field}={value}" for field, value in QUICK.items()]
 
 def quick(name="single_obstacle", **changes):
     return load_scenario(name, overrides={**QUICK, **changes})
+
+
+def module_of(path):
+    """A script as a module that is not in ``sys.modules``."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def python(code, *arguments, folder=None, **environment):

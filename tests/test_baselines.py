@@ -275,6 +275,8 @@ class Nothing(Policy):
         ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
         ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, closed, gap, got 'bold'"),
         ("bio_insp,safety_filter=true", "did you mean 'bio_inspired'"),
+        ("idle,barrier=5,safety_filter=true", "barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"),
+        ("idle,safety_filter=perhaps", "safety_filter must be true or false, got 'perhaps'"),
     ],
 )
 def test_a_name_that_means_nothing_is_explained(name, message):

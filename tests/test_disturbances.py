@@ -1,6 +1,5 @@
 """Currents, lags, mismatch and faults; test_disturbances_sonar.py has the sonar and navigation."""
 
-import itertools
 import math
 from operator import attrgetter
 
@@ -14,13 +13,13 @@ from tests.swarms import started
 from tests.test_tasks import TWO
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy
-from uuv_marl.sim.disturbances.actuation import followed, victims
+from uuv_marl.sim.disturbances.actuation import victims
 from uuv_marl.sim.disturbances.current import advance_gust, eddy_flow, flow_at
 from uuv_marl.sim.disturbances.disturbances import DISTURBANCE_CHANNELS, disturbance_tables
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.vehicle import Plant, advance_lagging, plant
+from uuv_marl.sim.vehicle import Plant, plant
 
 OPEN = {"obstacles": []}
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
@@ -239,24 +238,6 @@ def test_the_water_at_a_vehicle_is_the_field_there():
 def test_the_exponential_is_the_library_s(x, y):
     assert exp(x) == pytest.approx(math.exp(x), rel=3e-16, abs=1e-300)
     assert decay_mean(y) == pytest.approx(-math.expm1(-y) / y if y else 1.0, rel=1e-12)
-
-
-def test_a_lag_keeps_the_integration_s_fourth_order():
-    p = plant(load_scenario(STARTER))
-
-    def after_a_second(steps):
-        h, state, thrust, torque = 1.0 / steps, (0.0,) * 6, 0.0, 0.0
-        for _ in range(steps):
-            u = followed(1500.0, thrust, exp(-0.5 * h / 0.3), exp(-h / 0.3))
-            r = followed(200.0, torque, exp(-0.5 * h / 0.2), exp(-h / 0.2))
-            state = advance_lagging(state, *zip(u, r, strict=True), (0.0, 0.0), h, p)
-            thrust, torque = u[2], r[2]
-        return np.array(state)
-
-    exact = after_a_second(640)
-    errors = [np.abs(after_a_second(steps) - exact).max() for steps in (20, 40, 80)]
-    for coarse, fine in itertools.pairwise(errors):
-        assert 10 < coarse / fine < 24
 
 
 def test_a_vehicle_with_mismatch_moves_as_in_a_scenario_with_its_numbers():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.golden import STARTER
+from tests.oracle import sonar
 from tests.swarms import started
 from tests.test_replay_page import node
 from uuv_marl import load_scenario
@@ -36,12 +37,6 @@ def carried(decisions=30):
     return swarms
 
 
-def turned(vector, swarm):
-    """A north-east vector in the frame of each vehicle."""
-    c, s = np.moveaxis(swarm.heading[0], -1, 0)
-    return np.stack([c * vector[0] + s * vector[1], c * vector[1] - s * vector[0]], axis=-1)
-
-
 # --- Velocities over ground ---
 
 
@@ -61,7 +56,8 @@ def test_the_global_state_holds_the_velocity_over_ground():
     for swarm in (calm, moved):
         layout = state_layout(swarm.scenario)
         fields.append(Percept.from_observation(global_state(swarm, layout)[0], layout))
-    np.testing.assert_allclose(fields[1]["velocity"] - fields[0]["velocity"], turned(FLOW, moved), atol=1e-5)
+    flow = sonar.to_body(FLOW[None], moved.heading[0])
+    np.testing.assert_allclose(fields[1]["velocity"] - fields[0]["velocity"], flow, atol=1e-5)
     np.testing.assert_array_equal(fields[1]["yaw_rate"], fields[0]["yaw_rate"])
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import uuv_marl
+from tests.contract import ARRIVES, SINKS
 from uuv_marl import load_scenario, uuv_swarm_v1
 from uuv_marl.baselines import make_policy
 from uuv_marl.percept import Percept
@@ -179,23 +180,12 @@ def test_np_random_is_seeded_and_touches_nothing():
     np.testing.assert_array_equal(env.np_random.random(4), first)
 
 
-WIDE = {
-    "losses.times_s": [1.0, 2.0],
-    "collision.hull_radius_m": 22.0,
-    "start.spacing_m": 45.0,
-    "start.gap_m": 45.0,
-}
-"""Vehicles so wide that they touch soon."""
+WIDE = {key: value for key, value in SINKS.items() if key != "collision.ends_vehicle"}
+"""Vehicles so wide that they soon collide."""
 ENDINGS = {
-    "arrival": {
-        "trajectory.speed_mps": 40.0,
-        "arrival.radius_m": 5e3,
-        "arrival.spread_m": 2e4,
-        "arrival.dwell_s": 0.2,
-        "losses.times_s": [1.0],
-    },
+    "arrival": {**ARRIVES, "losses.times_s": [1.0]},
     "time_limit": {**WIDE, "time_limit.factor": 0.05, "time_limit.extra_s": 30.0},
-    "lost": {**WIDE, "collision.ends_vehicle": True},
+    "lost": {**WIDE, "collision.ends_vehicle": True, "time_limit.extra_s": 60.0},
 }
 
 

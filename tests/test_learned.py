@@ -28,10 +28,6 @@ def water(**overrides):
     return load_scenario("tracking", overrides={"actuators.yaw_damping_nms": 600.0, **overrides})
 
 
-def learned_file(folder):
-    return Path(folder) / WEIGHTS_FILE
-
-
 @pytest.fixture
 def best(tmp_path):
     return saved(tmp_path / "best", water(), training={"seed": 3})
@@ -167,7 +163,7 @@ def test_what_decides_beside_a_network_is_declared_and_acts(beside, policy_class
 
 
 def test_it_works_for_any_size_and_declares_what_it_needs(best):
-    digest = load_checkpoint(learned_file(best)).digest
+    digest = load_checkpoint(Path(best) / WEIGHTS_FILE).digest
     known = {
         "channels": [], "yaw_damping_nms": 600.0, "decision_period_s": 0.1, "source": digest,
         "policy_class": "end to end",

@@ -18,13 +18,11 @@ from tests.processes import python
 from tests.swarms import started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy
-from uuv_marl.sim.cells import ONE_CELL_UP_TO, fit, max_cells
+from uuv_marl.sim.cells import ONE_CELL_UP_TO
 from uuv_marl.sim.trigonometry import cos_sin, rotated
-from uuv_marl.sim.workspace import Columns
 
 BASE = load_scenario("tracking")
 SIZES = (1, 2, 3, 54, ONE_CELL_UP_TO, ONE_CELL_UP_TO + 1, 300, 600)
-GRIDS = [n for n in SIZES if n > ONE_CELL_UP_TO]
 
 
 @pytest.mark.parametrize("overrides", [{}, contract.SEA])
@@ -255,20 +253,10 @@ def far_away(rng, n):
     return uniform(rng, n) + np.array([1e7, -3e7, 0.0])
 
 
-def some_lost(rng, n):
-    return uniform(rng, n)
-
-
-def all_lost(rng, n):
-    return uniform(rng, n)
-
-
-def all_lost_but_one(rng, n):
-    return uniform(rng, n)
-
-
-LAYOUTS = (uniform, lattice, line, oblique_line, all_in_a_metre, coincident, two_clusters, outlier, range_edges,
-           rows_on_cell_edges, far_away, some_lost, all_lost, all_lost_but_one)  # fmt: skip
+LAYOUTS = {layout.__name__: layout for layout in (
+    uniform, lattice, line, oblique_line, all_in_a_metre, coincident, two_clusters, outlier, range_edges,
+    rows_on_cell_edges, far_away,
+)} | dict.fromkeys(("some_lost", "all_lost", "all_lost_but_one"), uniform)  # fmt: skip
 DISCS = ((40.0, 30.0, 25.0), (-80.0, 20.0, 10.0), (50.5, 50.5, 0.3), (150.0, -200.0, 60.0))
 
 
@@ -287,12 +275,12 @@ def world(suite, n):
 def fill(swarm, layout, seed):
     rng, n = np.random.default_rng(seed), swarm.num_vehicles
     state = swarm.state
-    state.eta[0] = layout(rng, n)
+    state.eta[0] = LAYOUTS[layout](rng, n)
     state.before[0] = state.eta[0, :, :2] + rng.normal(0, 1, (n, 2))
-    state.alive[0] = rng.random(n) < {some_lost: 0.7, all_lost: 0.0, all_lost_but_one: 0.0}.get(layout, 1.0)
-    if layout is all_lost_but_one:
+    state.alive[0] = rng.random(n) < {"some_lost": 0.7, "all_lost": 0.0, "all_lost_but_one": 0.0}.get(layout, 1.0)
+    if layout == "all_lost_but_one":
         state.alive[0, rng.integers(n)] = True
-    if layout is far_away:
+    if layout == "far_away":
         swarm.world_map.obstacles[0, :, :2] = np.array(DISCS)[:, :2] + [1e7, -3e7]
     else:
         swarm.world_map.obstacles[0] = DISCS
@@ -323,7 +311,7 @@ def check(swarm):
     assert facts.collisions[0] == sum(met) // 2 + sum(touched)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
+@pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("suite", SUITES)
 def test_neighbours_distances_and_collisions_are_those_of_the_oracle(suite, layout):
     for n in SIZES if suite == "as set" else (1, 2, 3, 54, 300) if suite == "hiding" else (3, 54, 300):
@@ -365,24 +353,6 @@ def test_bearings_within_rounding_of_an_edge_where_two_bins_of_direction_meet():
             swarm.state.eta[0, 1, :2] = edge + (np.array(nudge) - 2) * np.spacing(edge)
             swarm.observe()
             check(swarm)
-
-
-def grid_of(eta, side=16.25):
-    now = Columns(*np.zeros((len(Columns._fields), len(eta))))
-    now.x[:], now.y[:] = eta[:, 0], eta[:, 1]
-    return fit(0, np.ones((1, len(eta)), bool), side, now)
-
-
-@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
-def test_large_swarms_have_a_grid_of_bounded_size_and_small_ones_one_cell(layout):
-    for n in GRIDS:
-        grid = grid_of(layout(np.random.default_rng(0), n))
-        assert 1 <= grid.rows * grid.columns <= max_cells(n)
-        if layout not in (all_in_a_metre,):
-            assert grid.rows * grid.columns > 1
-    for n in (1, ONE_CELL_UP_TO):
-        grid = grid_of(layout(np.random.default_rng(0), n))
-        assert (grid.rows, grid.columns) == (1, 1)
 
 
 def test_a_vehicle_at_rest_at_a_hull_s_radius_from_an_obstacle_never_collides():

@@ -127,10 +127,6 @@ def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
     assert policy.name == "bio_inspired,zeta_n=0.5,safety_filter=true"
     assert policy.inner.gains.zeta_n == 0.5
     assert policy.barrier.obstacle_m == 9.0
-    with pytest.raises(PolicyError, match="barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"):
-        make_policy("bio_inspired,barrier=5,safety_filter=true", scenario)
-    with pytest.raises(PolicyError, match="safety_filter must be true or false, got 'perhaps'"):
-        make_policy("bio_inspired,safety_filter=perhaps", scenario)
     guarded = make_policy("sff,safety_filter=true", with_policy_requirements("sff,safety_filter=true", scenario))
     with pytest.raises(PolicyError, match=r"the snapshot's identity must be"):
         guarded.restore(guarded.snapshot() | {"inner.identity": np.zeros(3)})

@@ -136,16 +136,16 @@ def test_progress_and_pay_count_targets_that_no_nearer_vehicle_holds():
     assert not held[1:].any()
 
 
-def way_of(policy, decisions=300):
+def path_of(policy, decisions=300):
     swarm = water(2, "silent_targets_easy")
     fly(swarm, make_policy(policy, swarm.scenario, 2), decisions)
     return swarm.state.eta.copy()
 
 
 def test_every_gain_of_the_search_can_be_given_by_name_and_counts():
-    gains, usual = make_policy("nearest_target", load_scenario("silent_targets_easy")).gains, way_of("nearest_target")
+    gains, usual = make_policy("nearest_target", load_scenario("silent_targets_easy")).gains, path_of("nearest_target")
     for name, value in gains._asdict().items():
-        assert not np.array_equal(way_of(f"nearest_target,{name}={0.1 * value}"), usual), name
+        assert not np.array_equal(path_of(f"nearest_target,{name}={0.1 * value}"), usual), name
 
 
 def test_the_search_refuses_what_has_no_box():

@@ -135,33 +135,29 @@ def test_the_start_is_two_groups_behind_the_first_point_at_the_spacing(n, spacin
         assert swarm.facts.min_spacing.min() >= spacing
 
 
-def test_arrival_needs_rest_nearness_spread_and_dwell():
-    swarm = started("single_obstacle", n=2)
-    idle = np.zeros((1, 2, 2), np.float32)
+NEAR = [[5.0, 0.0], [-1.1, 0.0]]  # the centre 1.95 m off
+FAR = [[9.0, 0.0], [-1.1, 0.0]]
 
-    def stay(offsets, seconds, ticks_from):
-        swarm.state.tick[0] = ticks_from
+
+def test_arrival_needs_rest_nearness_spread_and_dwell():
+    swarm, late = started("single_obstacle", n=2), 1700
+    for offsets, seconds, tick, arrives in (
+        ([[1.0, 0.0], [-1.0, 0.0]], 20.0, 1000, False),  # l(t) still on its way
+        ([[90.0, 0.0], [-90.0, 0.0]], 6.0, late, False),  # too wide
+        ([[5.0, 0.0], [-0.9, 0.0]], 6.0, late, False),  # the centre 2.05 m off
+        (NEAR, 4.0, late, False),
+        (FAR, 0.1, late + 40, False),  # interrupted
+        (NEAR, 4.0, late + 41, False),
+        (FAR, 0.1, late, False),
+        (NEAR, 5.0, late, False),  # not long enough
+        (NEAR, 0.1, late + 50, True),
+    ):
+        swarm.state.tick[0] = tick
         for _ in range(round(seconds * 10)):
             swarm.state.eta[0, :, :2] = 600.0 + np.array(offsets)
             swarm.state.nu[0] = 0.0
-            swarm.step(idle)
-
-    late = 1700
-    stay([[1.0, 0.0], [-1.0, 0.0]], 20.0, 1000)  # l(t) still on its way
-    assert not swarm.arrived[0]
-    stay([[90.0, 0.0], [-90.0, 0.0]], 6.0, late)  # too wide
-    assert not swarm.arrived[0]
-    stay([[5.0, 0.0], [-0.9, 0.0]], 6.0, late)  # centre 2.05 m off
-    assert not swarm.arrived[0]
-    stay([[5.0, 0.0], [-1.1, 0.0]], 4.0, late)  # interrupted
-    stay([[9.0, 0.0], [-1.1, 0.0]], 0.1, late + 40)
-    stay([[5.0, 0.0], [-1.1, 0.0]], 4.0, late + 41)
-    assert not swarm.arrived[0]
-    stay([[9.0, 0.0], [-1.1, 0.0]], 0.1, late)
-    stay([[5.0, 0.0], [-1.1, 0.0]], 5.0, late)  # not long enough
-    assert not swarm.arrived[0]
-    stay([[5.0, 0.0], [-1.1, 0.0]], 0.1, late + 50)
-    assert swarm.arrived[0]
+            swarm.step(np.zeros((1, 2, 2), np.float32))
+        assert swarm.arrived[0] == arrives
     assert swarm.facts.arrival_s[0, 0] == pytest.approx((late + 1) / 10)
     assert math.isnan(swarm.facts.arrival_s[0, 1])  # never within 1 m
     assert swarm.facts.arrival_s[0, 2] <= swarm.facts.arrival_s[0, 0]  # within 5 m
@@ -263,10 +259,3 @@ def test_a_swarm_that_has_run_can_be_pickled_and_continues_alike():
     swarm.step(action)
     copy = pickle.loads(pickle.dumps(swarm))
     assert copy.step(action).flat.tobytes() == swarm.step(action).flat.tobytes()
-
-
-@pytest.mark.parametrize(("threads", "head"), [(1, 0), (3, 0), (3, 2), (7, 2), (3, 40), (12, 0)])
-def test_threads_do_all_of_the_work_once(threads, head):
-    done = []
-    assert on_threads(lambda thread, begin, end: done.extend(range(begin, end)) or end == 10, 10, threads, head)
-    assert sorted(done) == list(range(10))

@@ -744,17 +744,16 @@ def test_an_expert_whose_file_has_changed_is_refused(tmp_path, no_validation):
         next(resume(tmp_path / "1"))
 
 
-def test_a_training_that_is_told_to_stop_ends_with_a_checkpoint(tmp_path, no_validation):
+def test_a_training_that_is_asked_to_stop_ends_with_a_checkpoint(tmp_path, no_validation, uninterrupted):
     """After the iteration under way, and a resume goes on exactly, though no checkpoint was due."""
     stop = 3
-    list(train(tmp_path / "swarm_success", small()))
     asked, said = iter(range(1, 9)), []
     first = list(train(tmp_path / "a", small(), stop=lambda: next(asked) == stop))
     assert [record.iteration for record in first] == list(range(1, stop + 1))
     rest = list(resume(tmp_path / "a", say=said.append))
     assert [record.iteration for record in rest] == list(range(stop + 1, 6))
     assert said[0] == f"resuming from iteration {stop}, {168 * stop:,} agent-steps"
-    assert files(tmp_path / "a") == files(tmp_path / "swarm_success")
+    assert files(tmp_path / "a") == uninterrupted
 
 
 def test_a_first_start_that_was_cut_off_can_be_started_again(tmp_path, no_validation):
@@ -802,8 +801,9 @@ def test_an_incomplete_last_checkpoint_is_named(tmp_path, no_validation):
 
 
 @pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
-def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(error, tmp_path, no_validation, monkeypatch):
-    list(train(tmp_path / "swarm_success", small(validations=1)))
+def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(
+    error, tmp_path, no_validation, monkeypatch, uninterrupted
+):
     first = train(tmp_path / "a", small(validations=1))
     for _ in range(3):
         next(first)
@@ -814,7 +814,7 @@ def test_a_checkpoint_that_cannot_be_written_leaves_the_one_before(error, tmp_pa
             next(first)
     assert sorted(path.name for path in (tmp_path / "a" / "checkpoints").iterdir()) == ["000002", "000004.partial"]
     assert [record.iteration for record in resume(tmp_path / "a")] == [3, 4, 5]
-    assert files(tmp_path / "a") == files(tmp_path / "swarm_success")
+    assert files(tmp_path / "a") == uninterrupted
 
 
 @pytest.fixture(scope="module")
@@ -1037,9 +1037,9 @@ SETTINGS = {
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """Files of a training that nothing outside has changed."""
-    folder = tmp_path_factory.mktemp("swarm_success") / "a"
+def uninterrupted(tmp_path_factory):
+    """Files of a training that nothing has stopped and nothing outside has changed."""
+    folder = tmp_path_factory.mktemp("uninterrupted") / "a"
     with pytest.MonkeyPatch.context() as patch, trainings.fixed_torch():
         patch.setattr(trainings, "validate", lambda *_: GOOD)
         list(train(folder, small()))
@@ -1047,7 +1047,9 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.parametrize("setting", SETTINGS)
-def test_what_others_set_changes_no_training_and_holds_between_its_iterations(setting, whole, tmp_path, no_validation):
+def test_what_others_set_changes_no_training_and_holds_between_its_iterations(
+    setting, uninterrupted, tmp_path, no_validation
+):
     inside = []
     with SETTINGS[setting]():
         before = global_state()
@@ -1055,7 +1057,7 @@ def test_what_others_set_changes_no_training_and_holds_between_its_iterations(se
             assert global_state() == before
         assert global_state() == before
     assert inside == [FIXED] * 5
-    assert files(tmp_path) == whole
+    assert files(tmp_path) == uninterrupted
 
 
 def test_a_training_that_fails_gives_global_state_back(tmp_path, no_validation):

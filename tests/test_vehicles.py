@@ -159,19 +159,27 @@ def test_a_file_of_ones_own_has_variants_too(tmp_path):
     assert load_scenario(tmp_path / "course.toml").vehicle == heavy.vehicle
 
 
+HEAVY = "\n[variants.heavy.vehicle]\n"
+
+
 @pytest.mark.parametrize(
-    ("variants", "name", "message"),
+    ("before", "after", "name", "message"),
     [
-        ("[variants.heavy.vehicle]\nm_kg = 25.0", "havy", "has no variant 'havy'; it has heavy"),
-        ("[variants.heavy]\nm_kg = 25.0", "heavy", "variants.heavy must hold tables, such as [variants.heavy.vehicle]"),
-        ("[variants.heavy.vehicle]\nmass = 25.0", "heavy", "vehicle.mass is unknown"),
+        (r"\Z", f"{HEAVY}m_kg = 25.0", "+havy", "has no variant 'havy'; it has heavy"),
+        (r"\Z", "\n[variants.heavy]\nm_kg = 25.0", "+heavy", "must hold tables, such as [variants.heavy.vehicle]"),
+        (r"\Z", f"{HEAVY}mass = 25.0", "+heavy", "vehicle.mass is unknown"),
+        ("^m_kg = .*", "", "", "lacks vehicle.m_kg; add this number to the file"),
+        ("^lever_arm_m = .*", "", "", "lacks actuators.lever_arm_m"),
+        (r"^\[vehicle\]", "[swarm]\nnum_vehicles = 3\n[vehicle]", "", "may hold vehicle and actuators only"),
+        ("^m_kg = .*", "m_kg = ", "", "is not valid TOML"),
     ],
 )
-def test_a_variant_that_is_none_is_refused(variants, name, message, tmp_path):
-    own = tmp_path / "mine.toml"
-    own.write_text(show_vehicle("lauv") + variants)
+def test_a_vehicle_file_that_is_not_complete_or_lacks_a_variant_is_refused(before, after, name, message, tmp_path):
+    own, (text, changes) = tmp_path / "mine.toml", re.subn(before, after, show_vehicle("lauv"), count=1, flags=re.M)
+    assert changes == 1
+    own.write_text(text)
     with pytest.raises(ScenarioError, match=re.escape(message)):
-        load_scenario("tracking", overrides=SLOW | {"vehicle": f"{own}+{name}"})
+        load_scenario("tracking", overrides=SLOW | {"vehicle": f"{own}{name}"})
 
 
 def test_a_vehicle_that_replaces_another_leaves_nothing_of_it():

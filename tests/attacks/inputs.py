@@ -4,7 +4,6 @@ A case ends in "accepted" or "refused" (a clear error). Everything else that can
 """
 
 import copy
-import io
 import json
 import math
 import shutil
@@ -15,15 +14,14 @@ from pathlib import Path
 import numpy as np
 import safetensors.numpy
 from gymnasium.error import ResetNeeded
-from typer.testing import CliRunner
 
 import uuv_marl
 from tests.nets import ANYWHERE
 from tests.players import CYCLES, PLAYERS, compare, suited
+from tests.processes import cli
 from uuv_marl import load_scenario, scenario_names
 from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
 from uuv_marl.benchmark.results import Results
-from uuv_marl.cli import app
 from uuv_marl.errors import DivergenceError, PolicyError, ResultsError, ScenarioError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import parse_override
@@ -427,10 +425,8 @@ def prepare(folder):
     """Make what the cases start from, and compile what they need, so that their time limit is for them alone."""
     global SOURCE_RESULTS  # noqa: PLW0603
     SOURCE_RESULTS = folder / "source"
-    done = CliRunner().invoke(
-        app, ["benchmark", "--scenario", "starter", "--policy", "idle", "--seeds", "2", "--output", str(SOURCE_RESULTS)]
-    )
-    assert done.exit_code == 0, done.output
+    words = ["--scenario", "starter", "--policy", "idle", "--seeds", "2", "--output", SOURCE_RESULTS]
+    assert cli("benchmark", *words)[0] == 0
     for name in POLICIES:
         scenario = with_policy_requirements(name, load_scenario(TASKS_OF.get(name, "single_obstacle")))
         make_policy(name, scenario).act(Swarm(scenario).reset(0))
@@ -468,12 +464,7 @@ def command_line(rng, folder):
         word in line for word in ("--help", "-h", "0", "-1", "x", "²", "nowhere", "/dev/null", ":", "a:b")
     ):
         line.append("--nothing-like-this")  # so that no long work begins
-    out = io.StringIO()
-    done = CliRunner().invoke(app, line)
-    out.write(done.output)
-    if done.exception is not None and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    return "accepted" if done.exit_code == 0 else "refused"
+    return "accepted" if cli(*line)[0] == 0 else "refused"
 
 
 COUNTS = {
