@@ -50,14 +50,8 @@ except uuv_marl.scenario.ScenarioError as error:
 
 def run(folder, cache, script=MOVE, **environment):
     environment = {**os.environ, "PYTHONPATH": str(folder), "UUV_MARL_CACHE_DIR": str(cache), **environment}
-    return subprocess.run(
-        [sys.executable, "-c", script, str(folder)],
-        capture_output=True,
-        text=True,
-        check=True,
-        env=environment,
-        cwd=folder.parent,
-    )
+    command = [sys.executable, "-c", script, str(folder)]
+    return subprocess.run(command, capture_output=True, text=True, check=True, env=environment, cwd=folder.parent)
 
 
 @pytest.fixture
