@@ -8,8 +8,8 @@ import pytest
 from rich.console import Console
 
 from tests.processes import SETS, cli, quick
-from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements
+from tests.swarms import run_of
+from uuv_marl import evaluate, load_scenario
 from uuv_marl.baselines.safety import Barrier
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.estimates import estimate
@@ -18,13 +18,9 @@ from uuv_marl.benchmark.results import Results, ResultsError
 from uuv_marl.benchmark.tables import Table, terminal_table
 
 
-def runs_of(scenario, policy, seeds):
-    return {run.seed: run for run in episodes(with_policy_requirements(policy, scenario), policy, seeds)}
-
-
 def test_metrics_are_those_of_the_series(monkeypatch):
     monkeypatch.setattr("uuv_marl.benchmark.evaluate.ROUTE_PERIOD_S", 0.1)
-    run = runs_of(load_scenario("single_obstacle"), "bio_inspired", [4])[4]
+    run = run_of("bio_inspired", "single_obstacle", seed=4)
     series, metrics = run.series, run.metrics
     assert metrics["min_spacing_m"] == pytest.approx(series["min_spacing_m"].min())
     assert metrics["mean_min_spacing_m"] == pytest.approx(series["min_spacing_m"].mean(), rel=1e-5)
@@ -46,10 +42,9 @@ def test_metrics_are_those_of_the_series(monkeypatch):
 
 
 def test_a_run_does_not_depend_on_the_seeds_beside_it():
-    scenario = quick("random_field")
-    alone, together = runs_of(scenario, "bio_inspired", [3]), runs_of(scenario, "bio_inspired", list(range(40)))
-    assert alone[3].metrics == together[3].metrics
-    assert sorted(together) == list(range(40))
+    alone, together = (evaluate("bio_inspired", quick("random_field"), seeds) for seeds in ([3], range(40)))
+    assert alone == [together[3]]
+    assert [run["seed"] for run in together] == list(range(40))
 
 
 def test_the_estimate_is_the_interquartile_mean_with_its_interval():

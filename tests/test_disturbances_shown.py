@@ -8,11 +8,10 @@ import pytest
 
 from tests.golden import STARTER
 from tests.oracle import sonar
-from tests.swarms import started
+from tests.swarms import run_of, started
 from tests.test_replay_page import node
 from uuv_marl import load_scenario
 from uuv_marl.benchmark import runner
-from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.results import Results
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.percept import Percept
@@ -43,7 +42,7 @@ def carried(decisions=30):
 def test_traces_and_recordings_hold_the_velocity_over_ground():
     """Vehicles that do nothing end up with the water, at rest relative to it."""
     scenario = load_scenario(STARTER, overrides=CURRENT)
-    (run,) = episodes(scenario, "idle", [0])
+    run = run_of("idle", scenario)
     np.testing.assert_allclose(run.routes.velocity[-1], np.tile(FLOW, (5, 1)), atol=0.01)
     step = np.diff(run.routes.position[-3:-1], axis=0)[0] / np.diff(run.routes.time_s[-3:-1])
     np.testing.assert_allclose(run.routes.velocity[-1], step, atol=0.01)

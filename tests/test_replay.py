@@ -15,9 +15,8 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.processes import SETS, cli, quick
-from uuv_marl.baselines import make_policy, with_policy_requirements
+from tests.swarms import piloted, run_of
 from uuv_marl.benchmark import runner
-from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.errors import ReplayError, ResultsError
@@ -25,7 +24,6 @@ from uuv_marl.replay import encode
 from uuv_marl.replay.encode import CODINGS, payload, unwrapped
 from uuv_marl.replay.record import record
 from uuv_marl.replay.traces import from_folder, from_trace
-from uuv_marl.sim.swarm import Swarm
 
 ROUGH = {
     "start.spacing_m": 3.0, "start.length_m": 9.0, "start.width_m": 9.0, "collision.hull_radius_m": 1.4,
@@ -42,8 +40,7 @@ def rough(**changes):
 
 def test_a_recording_is_the_benchmarks_run():
     scenario = quick("random_field")
-    run = next(episodes(with_policy_requirements("sff", scenario), "sff", [3]))
-    recording = record(scenario, "sff", 3)
+    run, recording = run_of("sff", scenario, seed=3), record(scenario, "sff", 3)
     assert recording.metrics == run.metrics
     np.testing.assert_array_equal(recording.time_s, run.series["time_s"])
     np.testing.assert_array_equal(recording.waypoints, run.waypoints)
@@ -61,12 +58,10 @@ def test_a_recording_is_the_benchmarks_run():
 
 
 def test_inspected_vehicles_show_what_the_engine_recorded():
-    scenario = with_policy_requirements("bio_inspired", quick())
-    recording = record(scenario, "bio_inspired", 5, inspect=[6, 2, 6])
+    recording = record(quick(), "bio_inspired", 5, inspect=[6, 2, 6])
     assert list(recording.inspections) == [6, 2]
-    swarm, policy = Swarm(scenario), make_policy("bio_inspired", scenario)
-    percept = swarm.reset([5])
-    policy.reset([5])
+    swarm, policy = piloted("bio_inspired", quick(), seed=5)
+    percept = swarm.percept
     for t in range(30):
         action = policy.act(percept)
         for i, sonar in recording.inspections.items():

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from tests.processes import SETS, cli, quick
+from tests.swarms import run_of
 from uuv_marl import atomic, load_scenario
 from uuv_marl.atomic import locked
 from uuv_marl.benchmark import load, load_trace, runner
-from uuv_marl.benchmark.evaluate import Routes, episodes
+from uuv_marl.benchmark.evaluate import Routes
 from uuv_marl.benchmark.metrics import Metrics, Sample
 from uuv_marl.benchmark.results import Content, PolicyInfo, ResultRow, Results, trace_path
 from uuv_marl.benchmark.tables import markdown_table, scenario_table
@@ -81,8 +82,7 @@ def test_results_of_another_task_of_the_user_s_are_refused(tmp_path, monkeypatch
     file = tmp_path / "my_task.py"
     file.write_text("from uuv_marl.tasks import Follow\n\n\nclass Mine(Follow):\n    pass\n")
     scenario = load_scenario("starter", overrides={"task": "my_task:Mine"})
-    (run,) = (run for run in episodes(quick(), "idle", [0]))
-    Results(tmp_path / "out", [scenario]).add("starter", "idle", run)
+    Results(tmp_path / "out", [scenario]).add("starter", "idle", run_of("idle", quick()))
     assert Results(tmp_path / "out", [scenario]).has("starter", "idle", 0)
     assert Results(tmp_path / "out", [quick()]).has("starter", "idle", 0)
     file.write_text(file.read_text() + "# other\n")

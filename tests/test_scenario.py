@@ -190,14 +190,11 @@ BAD_SEA = [
 FAST = {"traffic.speed_mps": 2.0, "timing.decision_period_s": 0.1}
 BAD_TASKS = [
     ("hard_water", {"task.kinds": ["gates"]}, "task.kinds must name some of pocket, bar, .*got .'gates'."),
-    ("hard_water", {"task.kinds": []}, "task.kinds must name some of"),
     ("hard_water", {"task.gate.gap_m": [20.0, 10.0]}, r"gate.gap_m must be \[low, high\] with low .* got \[20.0, 10.0"),
     ("hard_water", {"task.bar.hole_m": 3.0}, "task.bar.hole_m is unknown"),
     ("hard_water", {"task.length_m": [150.0, 400.0]}, r"at least 167, task.first_wall_m and task.goal_clear_m"),
     ("hard_water", {"task.piles.apart_m": [0.0, 0.0]}, "task.piles.apart_m.0 must lie within 0.001"),
-    ("hard_water", {"task.bar.radius_m": [0.0, 2.0]}, "task.bar.radius_m.0 must lie within 0.001"),
     ("two_swarms", {"task.gap_aside_m": 100.0}, "must leave a wall on both sides within task.half_width_m .*, got 128"),
-    ("two_swarms", {"task.gap_m": [20.0, 10.0]}, r"task.gap_m must be \[low, high\] with low <= high"),
     ("two_swarms", {"task.gap_m": [1.0, 2.0]}, r"gap_m must be above 2, twice collision.hull_radius_m, got \[1.0, 2.0"),
     ("two_swarms", {"task.apart_m": 30.0}, "apart_m must be at least .*, so that groups .* long start before the wall"),
     ("two_swarms", {"start.width_m": 210.0}, "the groups must start within the banks of task 'two_swarms'"),
@@ -228,10 +225,7 @@ def test_bad_values_name_field_value_and_remedy(scenario, overrides, message):
     [
         ({"scenario": 5}, "scenario must be a name, a path ending in .toml, or a Scenario, got 5"),
         ({"scenario": "single_obstcle"}, "did you mean 'single_obstacle'"),
-        (
-            {"scenario": "mycourse"},
-            "scenario 'mycourse' is unknown; give one of few_informed, .* or a path",
-        ),
+        ({"scenario": "mycourse"}, "scenario 'mycourse' is unknown; give one of few_informed, .* or a path"),
         ({"scenario": "x" * 5000 + ".toml"}, "scenario file 'xxx.*... does not exist"),
         ({"num_vehicles": True}, "swarm.num_vehicles must be a whole number, got True"),
         ({"overrides": "x"}, "overrides must be a dictionary of fields and values, got 'x'"),

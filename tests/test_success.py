@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 import uuv_marl
-from tests.swarms import started
+from tests.swarms import run_of, started
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
 from uuv_marl.envs.core import BatchedEnv
 
@@ -136,13 +134,7 @@ LONG = {"arrival.ends_episode": False, "time_limit.factor": 1.0, "time_limit.ext
 
 def test_an_episode_that_arrival_does_not_end_goes_on_as_it_was():
     """The same run to arrival, with the same arrival, and then to the time limit."""
-    short, long = (
-        next(
-            event
-            for event in episodes(with_policy_requirements("bio_inspired_plus", scenario), "bio_inspired_plus", [3])
-        )
-        for scenario in (load_scenario("starter"), load_scenario("starter", overrides=LONG))
-    )
+    short, long = (run_of("bio_inspired_plus", "starter", changes, 3) for changes in ({}, LONG))
     assert long.metrics["task_time_s"] == short.metrics["task_time_s"]
     assert short.metrics["success_share"] is None
     assert long.metrics["success_share"] == 1.0

@@ -10,7 +10,7 @@ import pytest
 
 import uuv_marl
 from tests.processes import cli, python
-from tests.swarms import started
+from tests.swarms import run_of, started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import episodes
@@ -263,8 +263,7 @@ def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():
         assert (mine.timing.decision_period_s, mine.actuators.yaw_damping_nms) == (0.5, 600.0)
     own = with_policy_requirements("bio_inspired,own_clock=true", scenario)
     assert (own.timing.decision_period_s, own.actuators.yaw_damping_nms) == (0.1, 0.0)
-    (run,) = episodes(own, "bio_inspired,own_clock=true", [0])
-    assert run.metrics["task_time_s"] is not None
+    assert run_of("bio_inspired,own_clock=true", scenario).metrics["task_time_s"] is not None
 
 
 @pytest.fixture

@@ -304,7 +304,7 @@ def test_a_seed_is_taken_for_the_number_that_it_is(make, seed):
 
 @pytest.mark.parametrize(
     "seed",
-    [np.array(-3), 1.5, "1", True, {}, [1.5], np.array(1.5), np.array("3"), object()],
+    [np.array(-3), 1.5, "1", True, {}, [1.5, 2.5], np.array(1.5), np.array("3"), object()],
     ids=lambda seed: type(seed).__name__,
 )
 @pytest.mark.parametrize("make", [uuv_marl.parallel_env, SoloEnv, partial(uuv_marl.vector_env, 2)])
