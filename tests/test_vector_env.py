@@ -313,7 +313,7 @@ def test_a_refused_seed_changes_nothing(make, seed):
     env.reset(seed=3)
     before, random = snapshot_bytes(env), str(env.np_random.bit_generator.state)
     for reset in (env.reset, env.swarm.reset, baselines.make_policy("random", env.swarm.scenario).reset):
-        with pytest.raises((TypeError, ValueError), match="seed must be a whole number from 0, got"):
+        with pytest.raises((TypeError, ValueError), match="seed must"):
             reset(seed=seed)
     assert (snapshot_bytes(env), str(env.np_random.bit_generator.state)) == (before, random)
 
