@@ -66,26 +66,3 @@ def compiled_by_halves():
 @pytest.fixture(params=SCENARIOS)
 def scenario_name(request):
     return request.param
-
-
-@pytest.fixture
-def place():
-    """A swarm of one world with vehicles and obstacles where a test wants them."""
-
-    def placed(scenario, eta, nu=None, obstacles=()):
-        eta = np.asarray(eta, float).reshape(-1, 3)
-        discs = [
-            {"centre_m": list(o[:2]), "radius_m": o[2]}
-            for o in [(5000.0 + 100 * k, 5000.0, 1.0) for k in range(len(obstacles))]
-        ]
-        swarm = Swarm(load_scenario(scenario, num_vehicles=len(eta), overrides={"obstacles": discs}))
-        swarm.reset(0)
-        swarm.state.eta[0] = eta
-        swarm.state.before[0] = eta[:, :2]
-        swarm.state.nu[0] = 0.0 if nu is None else nu
-        if len(obstacles):
-            swarm.world_map.obstacles[0] = swarm.state.obstacles_before[0] = obstacles
-        swarm.observe()
-        return swarm
-
-    return placed

@@ -45,12 +45,34 @@ def by_agent(env, actions):
     return whole
 
 
-def parallel(name, scenario, seed, decisions, rng, wrap=lambda env: env):
+def sometimes_twice(policy, observations, agents, rng):
+    if rng.random() < 0.3:
+        policy(observations)
+    return policy(observations)
+
+
+def by_parts(policy, observations, agents, rng):
+    actions = {}
+    for some in np.array_split(rng.permutation(agents), rng.integers(1, len(agents) + 1)):
+        actions |= policy({agent: observations[agent] for agent in some})
+    return actions
+
+
+def parallel(name, scenario, seed, decisions, rng, wrap=lambda env: env, ask=sometimes_twice):
     """Dictionaries of all agents, sometimes asked twice."""
-    return [
-        _dictionaries(wrap(uuv_marl.parallel_env(scenario, max_cycles=CYCLES)), name, seed + w, decisions, rng)
-        for w in range(WORLDS)
-    ]
+    records = []
+    for w in range(WORLDS):
+        env, record = wrap(uuv_marl.parallel_env(scenario, max_cycles=CYCLES)), []
+        policy = make_policy(name, env)
+        observations, _ = env.reset(seed=seed + w)
+        while len(record) < decisions:
+            actions = ask(policy, observations, env.agents, rng)
+            record.append(by_agent(env, actions))
+            observations, *_ = env.step(actions)
+            if not env.agents:
+                observations, _ = env.reset()
+        records.append(record)
+    return records
 
 
 def wrapped(name, scenario, seed, decisions, rng):
@@ -58,37 +80,9 @@ def wrapped(name, scenario, seed, decisions, rng):
     return parallel(name, scenario, seed, decisions, rng, BaseParallelWrapper)
 
 
-def _dictionaries(env, name, seed, decisions, rng):
-    policy, record = make_policy(name, env), []
-    observations, _ = env.reset(seed=seed)
-    while len(record) < decisions:
-        if rng.random() < 0.3:
-            policy(observations)
-        actions = policy(observations)
-        record.append(by_agent(env, actions))
-        observations, *_ = env.step(actions)
-        if not env.agents:
-            observations, _ = env.reset()
-    return record
-
-
 def parts(name, scenario, seed, decisions, rng):
     """Some agents at a time, in any order."""
-    records = []
-    for w in range(WORLDS):
-        env, record = uuv_marl.parallel_env(scenario, max_cycles=CYCLES), []
-        policy = make_policy(name, env)
-        observations, _ = env.reset(seed=seed + w)
-        while len(record) < decisions:
-            agents, actions = rng.permutation(env.agents), {}
-            for some in np.array_split(agents, rng.integers(1, len(agents) + 1)):
-                actions |= policy({agent: observations[agent] for agent in some})
-            record.append(by_agent(env, actions))
-            observations, *_ = env.step(actions)
-            if not env.agents:
-                observations, _ = env.reset()
-        records.append(record)
-    return records
+    return parallel(name, scenario, seed, decisions, rng, ask=by_parts)
 
 
 def aec(name, scenario, seed, decisions, rng):

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from research.episodes import read_rows
 from tests.golden import STARTER
 from tests.nets import ANYWHERE
+from tests.swarms import fly, piloted
 from uuv_marl import load_scenario, parallel_env, scenario_names
 from uuv_marl.baselines import POLICIES, Policy, PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
@@ -62,9 +63,7 @@ def written_as_in_the_paper(percept, gains, limits):
 @settings(max_examples=15)
 @given(st.integers(0, 1000))
 def test_the_controller_is_equations_18_to_22(seed):
-    scenario = load_scenario("single_obstacle")
-    swarm, policy = Swarm(scenario), make_policy("bio_inspired", scenario)
-    swarm.reset(seed)
+    swarm, policy = piloted("bio_inspired", "single_obstacle", seed=seed)
     swarm.state.eta[0, :, :2] += 150.0  # before and beside the obstacle
     percept = swarm.observe()
     action = policy.act(percept)
@@ -78,13 +77,11 @@ def test_the_controller_is_equations_18_to_22(seed):
 @pytest.mark.parametrize("name", [*(name for name in ANYWHERE if name != "random"), "mappo,safety_filter=true"])
 def test_forces_turn_with_the_world(name):
     """Body-frame actions don't change, up to float32, when the world is rotated and moved."""
-    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=20))
     turn, (x, y) = 0.7, (50.0, -80.0)
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     actions = []
     for moved in (False, True):
-        swarm, policy = Swarm(scenario), make_policy(name, scenario)
-        swarm.reset(3)
+        swarm, policy = piloted(name, "single_obstacle", seed=3, n=20)
         swarm.state.eta[0, :, :2] += 150.0
         if moved:
             swarm.state.eta[0, :, :2] = swarm.state.eta[0, :, :2] @ rotation.T + (x, y)
@@ -104,11 +101,9 @@ def test_forces_turn_with_the_world(name):
 @pytest.mark.parametrize("name", [name for name in ANYWHERE if name != "random"])
 def test_who_a_vehicle_is_does_not_matter(name):
     """Vehicles that swap their places swap their actions."""
-    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=20))
     order, actions = np.random.default_rng(0).permutation(20), []
     for places in (np.arange(20), order):
-        swarm, policy = Swarm(scenario), make_policy(name, scenario)
-        swarm.reset(3)
+        swarm, policy = piloted(name, "single_obstacle", seed=3, n=20)
         swarm.state.eta[0, :, :2] += 150.0
         swarm.state.eta[0], swarm.state.nu[0] = swarm.state.eta[0, places], swarm.state.nu[0, places]
         actions.append(policy.act(swarm.observe())[0])
@@ -160,6 +155,7 @@ def test_slots_are_a_lattice_around_zero(n):
         np.testing.assert_allclose(away.min(axis=1), sdc.SLOT_PITCH_M)
 
 
+WITH_MEMORY = ["sff", "sdc", "scout", "tangent_bug", "sff,safety_filter=true"]
 FOLDER = resources.files("uuv_marl.baselines") / "tuned"
 TRIED = Path(__file__).resolve().parent.parent / "research" / "tuned"
 
@@ -182,19 +178,15 @@ def test_tuned_gains_come_from_shipped_trials(file):
     assert {key: numbers[key] for key in data["best"]} == data["best"]
 
 
-def flown(name, scenario, decisions=6, worlds=2):
-    scenario = with_policy_requirements(name, load_scenario(scenario))
-    swarm, policy = Swarm(scenario, worlds), make_policy(name, scenario, worlds)
-    percept = swarm.reset(0)
+def flown(name):
+    swarm, policy = piloted(name, STARTER, worlds=2)
     policy.reset(0)
-    for _ in range(decisions):
-        percept = swarm.step(policy.act(percept))
-    return swarm, policy, percept
+    return swarm, policy, fly(swarm, policy, 6)
 
 
 @pytest.mark.parametrize("name", [*ANYWHERE, "mappo,safety_filter=true"])
 def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
-    swarm, policy, percept = flown(name, STARTER)
+    swarm, policy, percept = flown(name)
     again, kept, water = pickle.loads(pickle.dumps(policy)), policy.snapshot(), swarm.snapshot()
     first = policy.act(percept)
     assert np.array_equal(again.act(percept), first)
@@ -207,9 +199,9 @@ def test_a_policy_pickles_with_its_memory_and_goes_on_from_a_snapshot(name):
         policy.restore({**kept, "clamps": np.zeros(5)})
 
 
-@pytest.mark.parametrize("name", ["sff", "sdc", "scout", "sff,safety_filter=true"])
+@pytest.mark.parametrize("name", WITH_MEMORY)
 def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
-    swarm, policy, percept = flown(name, STARTER)
+    swarm, policy, percept = flown(name)
     first = policy.act(percept)
     assert np.array_equal(policy.act(percept), first), "asked twice at one time, it must say the same"
     swarm.step(first)
@@ -220,10 +212,10 @@ def test_a_policy_with_memory_notices_what_it_was_left_out_of(name):
     policy.act(swarm.percept)
 
 
-@pytest.mark.parametrize("name", ["sff", "sdc", "scout", "sff,safety_filter=true"])
+@pytest.mark.parametrize("name", WITH_MEMORY)
 def test_a_world_that_was_reset_is_forgotten_without_a_word(name):
     """So that memory does not outlive an autoreset, whichever API did it; the other world keeps its own."""
-    swarm, policy, percept = flown(name, STARTER)
+    swarm, policy, percept = flown(name)
     before = [array[1].copy() for array in policy.memory]
     percept = swarm.reset([5], worlds=[0])
     action = policy.act(percept)
@@ -283,6 +275,8 @@ class Nothing(Policy):
         ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
         ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, closed, gap, got 'bold'"),
         ("bio_insp,safety_filter=true", "did you mean 'bio_inspired'"),
+        ("idle,barrier=5,safety_filter=true", "barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"),
+        ("idle,safety_filter=perhaps", "safety_filter must be true or false, got 'perhaps'"),
     ],
 )
 def test_a_name_that_means_nothing_is_explained(name, message):

@@ -24,9 +24,8 @@ for indices in ((0, 1), (0, 7)):
 def test_an_index_out_of_bounds_is_an_error_under_the_check(tmp_path):
     (tmp_path / "reads.py").write_text(READ)
     environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "UUV_MARL_CACHE_DIR": str(tmp_path)}
-    done = subprocess.run(
-        [sys.executable, "reads.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
+    command = [sys.executable, "reads.py"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "IndexError: index is out of bounds" in done.stderr, "also on a thread that helps"
     assert done.stdout.splitlines() == ["read"]

@@ -8,11 +8,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from tests.swarms import fly, piloted
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.comparators import apf, olfati_saber, orca
 from uuv_marl.percept import Percept, PerceptLayout
-from uuv_marl.sim.swarm import Swarm
 
 APF = apf.ApfGains(80.0, 40_000.0, 50.0, 500_000.0, 20.0)
 FLOCK = olfati_saber.OlfatiSaberGains(2.0, 14.0, 1.5, 200.0, 2000.0, 3000.0, 40.0, 300.0, 1500.0, 50.0, 400.0)
@@ -111,16 +111,14 @@ def test_vehicles_in_free_water_settle_at_the_spacing(spacing):
     gains = FLOCK._replace(
         spacing=spacing, reach=1.3, attraction=100.0, repulsion=500.0, pull=5.0, reference_velocity=300.0
     )
-    scenario = with_policy_requirements("olfati_saber", load_scenario("tracking", num_vehicles=7))
-    swarm, policy = Swarm(scenario), make_policy("olfati_saber", scenario, gains=gains)
-    swarm.reset(10_000)
+    swarm, policy = piloted("olfati_saber", "tracking", seed=10_000, n=7, gains=gains)
     angle = np.arange(6) * math.pi / 3
     ring = 12.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     swarm.state.eta[0, :, :2] = swarm.facts.reference[0, 0, :2] + np.concatenate([np.zeros((1, 2)), ring])
     swarm.state.eta[0, :, :2] += np.random.default_rng(0).uniform(-2.0, 2.0, (7, 2))
-    percept = swarm.observe()
+    swarm.observe()
     while swarm.facts.time_s[0] < 100.0:
-        percept = swarm.step(policy.act(percept))
+        fly(swarm, policy, 1)
     place = swarm.state.eta[0, :, :2]
     away = np.sort(np.hypot(*(place[:, None] - place[None]).transpose(2, 0, 1)), axis=1)
     np.testing.assert_allclose(away[:, 1:3], spacing, rtol=0.02)  # at a corner a vehicle has two

@@ -15,9 +15,8 @@ import numpy as np
 import pytest
 
 import uuv_marl
-from uuv_marl import load_scenario
+from tests.swarms import started
 from uuv_marl.sim import compiled, sources
-from uuv_marl.sim.swarm import Swarm
 
 PACKAGE = Path(uuv_marl.__file__).parent
 # The smallest compiled function that calls another file's: a vehicle's drag, reached through the Runge-Kutta step.
@@ -51,14 +50,8 @@ except uuv_marl.scenario.ScenarioError as error:
 
 def run(folder, cache, script=MOVE, **environment):
     environment = {**os.environ, "PYTHONPATH": str(folder), "UUV_MARL_CACHE_DIR": str(cache), **environment}
-    return subprocess.run(
-        [sys.executable, "-c", script, str(folder)],
-        capture_output=True,
-        text=True,
-        check=True,
-        env=environment,
-        cwd=folder.parent,
-    )
+    command = [sys.executable, "-c", script, str(folder)]
+    return subprocess.run(command, capture_output=True, text=True, check=True, env=environment, cwd=folder.parent)
 
 
 @pytest.fixture
@@ -263,8 +256,7 @@ def test_inner_functions_refuse_python_and_do_not_crash():
     """They have no Python wrapper, so that a call would crash."""
     from uuv_marl.sim import world
 
-    swarm = Swarm(load_scenario("starter"))
-    swarm.reset(0)
+    swarm = started("starter")
     swarm.step(np.zeros((1, 5, 2)))
     with pytest.raises(TypeError, match="clear_facts can be called by compiled code only"):
         world.clear_facts(0, swarm.facts)
@@ -272,8 +264,7 @@ def test_inner_functions_refuse_python_and_do_not_crash():
 
 def test_threads_without_work_sleep():
     """Threads that spin while they wait slow others down: a batch during a training took ten times as long."""
-    swarm, action = Swarm(load_scenario("single_obstacle"), 8), np.zeros((8, 54, 2), np.float32)
-    swarm.reset(0)
+    swarm, action = started("single_obstacle", worlds=8), np.zeros((8, 54, 2), np.float32)
     swarm.step(action)
     spent = time.process_time()
     time.sleep(0.3)

@@ -1,7 +1,7 @@
 """Currents, lags, mismatch and faults; test_disturbances_sonar.py has the sonar and navigation."""
 
-import itertools
 import math
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -9,15 +9,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.golden import STARTER
+from tests.swarms import started
+from tests.test_tasks import TWO
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy
-from uuv_marl.sim.disturbances.actuation import followed, victims
+from uuv_marl.sim.disturbances.actuation import victims
 from uuv_marl.sim.disturbances.current import advance_gust, eddy_flow, flow_at
 from uuv_marl.sim.disturbances.disturbances import DISTURBANCE_CHANNELS, disturbance_tables
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
 from uuv_marl.sim.swarm import Swarm
-from uuv_marl.sim.vehicle import Plant, advance_lagging, plant
+from uuv_marl.sim.vehicle import Plant, plant
 
 OPEN = {"obstacles": []}
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
@@ -32,6 +34,7 @@ FAULTS = {
         {"kind": "member", "share": 0.2, "onset_s": 2.0},
     ]
 }
+TRAFFIC = {"traffic.speed_mps": 1.0}
 EVERYTHING = CURRENT | GUSTS | EDDIES | LAGS | MISMATCH | FAULTS
 HEARD = EVERYTHING | {
     "latency.processing_s": 0.5, "latency.travel_time": True, "latency.compensated": True,
@@ -39,15 +42,13 @@ HEARD = EVERYTHING | {
     "noise.passive_range_log_sd": 0.3, "noise.silence_probability": 0.1, "noise.silence_readings": 5,
     "noise.false_echo_probability": 0.1, "navigation.drift_share": 0.1, "navigation.compass_bias_deg": 10.0,
     "modem.period_s": 0.5, "sonar.channels": ["modem", "link", "age"],
-}  # fmt: skip
+} | TRAFFIC  # fmt: skip
 """The same with all delays and errors of readings."""
 
 
 def swim(overrides, decisions=40, worlds=1, seed=3, scenario=STARTER, **change):
     """A swarm after decisions that don't depend on its disturbances."""
-    swarm = Swarm(load_scenario(scenario, overrides=overrides, **change), worlds)
-    swarm.reset(seed)
-    rng = np.random.default_rng(7)
+    swarm, rng = started(scenario, overrides, worlds, seed, **change), np.random.default_rng(7)
     for _ in range(decisions):
         swarm.step(rng.uniform(-1.0, 1.0, (worlds, swarm.num_vehicles, 2)))
     return swarm
@@ -66,37 +67,37 @@ def test_the_code_of_disturbances_with_all_of_them_off_changes_no_bit(channel):
             np.testing.assert_array_equal(array, theirs[name], name)
 
 
-@pytest.mark.parametrize("part", [CURRENT, GUSTS, EDDIES, LAGS, MISMATCH, FAULTS])
+@pytest.mark.parametrize("part", [CURRENT, GUSTS, EDDIES, LAGS, MISMATCH, FAULTS, TRAFFIC])
 def test_one_disturbance_changes_no_random_number_of_another(part):
     """Starts, maps and all else that the seed decides are the same with it alone and with everything on."""
     alone, among = (swim(change, 0, scenario="random_field") for change in (part, EVERYTHING))
     for name in ("eta", "nu", "waypoints", "obstacles", "losses"):
         np.testing.assert_array_equal(alone.snapshot()[name], among.snapshot()[name], name)
-    ours, theirs = alone._disturbances, among._disturbances
-    pairs = {
-        "current.speed_mps": (ours.flow.mean, theirs.flow.mean),
-        "current.variation_mps": (ours.flow.gust, theirs.flow.gust),
-        "current.eddies": (ours.flow.eddies, theirs.flow.eddies),
-        "mismatch.mass": (ours.hull.plants, theirs.hull.plants),
-        "faults": (ours.hull.broken, theirs.hull.broken),
-    }
-    for field, (own, other) in pairs.items():
-        if field in part:
-            np.testing.assert_array_equal(own, other, field)
+    drawn = {"current.speed_mps": "flow.mean", "current.variation_mps": "flow.gust", "current.eddies": "flow.eddies",
+             "mismatch.mass": "hull.plants", "faults": "hull.broken"}  # fmt: skip
+    for table in (drawn[field] for field in drawn.keys() & part):
+        np.testing.assert_array_equal(*map(attrgetter(f"_disturbances.{table}"), (alone, among)), table)
 
 
-def test_a_snapshot_resumes_bit_for_bit():
-    swarm = swim(HEARD)
-    kept, other = swarm.snapshot(), Swarm(swarm.scenario)
-    other.reset(99)
+@pytest.mark.parametrize(
+    ("scenario", "overrides", "index", "limits"),
+    [
+        (STARTER, HEARD, "target_index", "-3 and 4"),
+        ("silent_targets", {}, "last", "1 and"),
+        ("multi_obstacle", TWO, "group", "0 and 1"),
+    ],
+)
+def test_a_snapshot_resumes_bit_for_bit_and_has_its_indices_checked(scenario, overrides, index, limits):
+    swarm = swim(overrides, scenario=scenario)
+    kept, other = swarm.snapshot(), started(swarm.scenario, seed=99)
     other.restore(kept)
     for each in (swarm, other):
         for _ in range(20):
-            each.step(np.full((1, 5, 2), 0.4))
+            each.step(np.full((1, swarm.num_vehicles, 2), 0.4))
     for name, array in swarm.snapshot().items():
         np.testing.assert_array_equal(array, other.snapshot()[name], name)
-    kept["target_index"][:] = 5
-    with pytest.raises(ValueError, match="target_index must lie within -3 and 4"):
+    kept[index][...] = 99
+    with pytest.raises(ValueError, match=f"{index} must lie within {limits}"):
         swarm.restore(kept)
 
 
@@ -167,8 +168,7 @@ def test_the_process_has_its_mean_variance_and_memory_whatever_the_step(control_
     tau = 3.0
     overrides = {"current.variation_mps": 0.4, "current.variation_time_s": tau, "timing.control_step_s": control_step_s,
                  "timing.decision_period_s": control_step_s}  # fmt: skip
-    swarm = Swarm(load_scenario(STARTER, overrides=overrides), num_worlds=1)
-    swarm.reset(0)
+    swarm = started(STARTER, overrides)
     disturbances = swarm._disturbances
     steps = round(6.0 / control_step_s)
     first, last = [], []
@@ -240,24 +240,6 @@ def test_the_exponential_is_the_library_s(x, y):
     assert decay_mean(y) == pytest.approx(-math.expm1(-y) / y if y else 1.0, rel=1e-12)
 
 
-def test_a_lag_keeps_the_integration_s_fourth_order():
-    p = plant(load_scenario(STARTER))
-
-    def after_a_second(steps):
-        h, state, thrust, torque = 1.0 / steps, (0.0,) * 6, 0.0, 0.0
-        for _ in range(steps):
-            u = followed(1500.0, thrust, exp(-0.5 * h / 0.3), exp(-h / 0.3))
-            r = followed(200.0, torque, exp(-0.5 * h / 0.2), exp(-h / 0.2))
-            state = advance_lagging(state, *zip(u, r, strict=True), (0.0, 0.0), h, p)
-            thrust, torque = u[2], r[2]
-        return np.array(state)
-
-    exact = after_a_second(640)
-    errors = [np.abs(after_a_second(steps) - exact).max() for steps in (20, 40, 80)]
-    for coarse, fine in itertools.pairwise(errors):
-        assert 10 < coarse / fine < 24
-
-
 def test_a_vehicle_with_mismatch_moves_as_in_a_scenario_with_its_numbers():
     swarm = swim(MISMATCH, 0)
     nominal = plant(swarm.scenario)
@@ -284,8 +266,7 @@ def test_a_larger_share_has_the_smaller_one_s_victims(a, b, key):
 
 
 def test_faults_act_from_their_onset_for_their_duration():
-    swarm = Swarm(load_scenario(STARTER, overrides=FAULTS))
-    swarm.reset(0)
+    swarm = started(STARTER, FAULTS)
     victim = [set(np.flatnonzero(swarm._disturbances.hull.broken[0, :, f, 0] < 10**6).tolist()) for f in range(3)]
     assert [len(each) for each in victim] == [2, 2, 1]
     for hold in range(25):

@@ -6,20 +6,19 @@ import numpy as np
 import pytest
 
 from tests.golden import STARTER
+from tests.swarms import fly, piloted, started
 from uuv_marl import load_scenario
-from uuv_marl.baselines import Policy, make_policy, with_policy_requirements
+from uuv_marl.baselines import Policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, save_checkpoint
 from uuv_marl.baselines.learned.layers import shapes
 from uuv_marl.baselines.requirements import PolicyRequirements
-from uuv_marl.sim.swarm import Swarm
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
 
 
-def swum(overrides, decisions=100, worlds=1, seed=0, **change):
+def swum(overrides, decisions=100, worlds=1):
     """The swarm after the reset and after each decision."""
-    swarm = Swarm(load_scenario(STARTER, overrides=MODEM | overrides, **change), worlds)
-    swarm.reset(seed)
+    swarm = started(STARTER, MODEM | overrides, worlds)
     yield swarm
     rng = np.random.default_rng(1)
     for _ in range(decisions):
@@ -86,18 +85,11 @@ def test_compass_errors_turn_messages_sent_and_read():
 def test_comparators_run_on_messages_as_on_the_link(policy):
     """The same controller: with messages as recent as the link it acts the same."""
     base = {"modem.period_s": 0.1, "obstacles": []}
-    linked = with_policy_requirements(policy, load_scenario(STARTER, overrides=base))
-    messaged = with_policy_requirements(policy, load_scenario(STARTER, overrides={**base, "sonar.channels": ["modem"]}))
-    assert "link" not in messaged.sonar.channels
-    assert "modem" in messaged.sonar.channels
     paths = []
-    for scenario in (linked, messaged):
-        swarm = Swarm(scenario)
-        swarm.reset(0)
-        actor = make_policy(policy, scenario)
-        actor.reset(0)
-        for _ in range(30):
-            swarm.step(actor.act(swarm.percept))
+    for channels in ([], ["modem"]):
+        swarm, actor = piloted(policy, STARTER, {**base, "sonar.channels": channels})
+        assert ("link" in swarm.scenario.sonar.channels) == ("modem" not in swarm.scenario.sonar.channels)
+        fly(swarm, actor, 30)
         paths.append(swarm.state.eta[0, :, :2].copy())
     assert np.abs(paths[0] - paths[1]).max() < 3.0  # the first message comes a decision late
     assert (paths[0] != paths[1]).any()

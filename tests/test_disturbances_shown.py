@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from tests.golden import STARTER
+from tests.oracle import sonar
+from tests.swarms import run_of, started
 from tests.test_replay_page import node
 from uuv_marl import load_scenario
-from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.percept import Percept
 from uuv_marl.replay.encode import CODINGS
 from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
-from uuv_marl.sim.swarm import Swarm
 
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
 FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])
@@ -25,19 +25,12 @@ FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])
 
 def carried(decisions=30):
     """The same actions in still water and in a current, which moves no bit of headings and velocities through it."""
-    swarms = [Swarm(load_scenario(STARTER, overrides=change)) for change in ({"obstacles": []}, CURRENT)]
+    swarms = [started(STARTER, change, seed=3) for change in ({"obstacles": []}, CURRENT)]
     for swarm in swarms:
-        swarm.reset(3)
         rng = np.random.default_rng(7)
         for _ in range(decisions):
             swarm.step(rng.uniform(-1.0, 1.0, (1, 5, 2)))
     return swarms
-
-
-def turned(vector, swarm):
-    """A north-east vector in the frame of each vehicle."""
-    c, s = np.moveaxis(swarm.heading[0], -1, 0)
-    return np.stack([c * vector[0] + s * vector[1], c * vector[1] - s * vector[0]], axis=-1)
 
 
 # --- Velocities over ground ---
@@ -46,7 +39,7 @@ def turned(vector, swarm):
 def test_traces_and_recordings_hold_the_velocity_over_ground():
     """Vehicles that do nothing end up with the water, at rest relative to it."""
     scenario = load_scenario(STARTER, overrides=CURRENT)
-    (run,) = episodes(scenario, "idle", [0])
+    run = run_of("idle", scenario)
     np.testing.assert_allclose(run.routes.velocity[-1], np.tile(FLOW, (5, 1)), atol=0.01)
     step = np.diff(run.routes.position[-3:-1], axis=0)[0] / np.diff(run.routes.time_s[-3:-1])
     np.testing.assert_allclose(run.routes.velocity[-1], step, atol=0.01)
@@ -59,7 +52,8 @@ def test_the_global_state_holds_the_velocity_over_ground():
     for swarm in (calm, moved):
         layout = state_layout(swarm.scenario)
         fields.append(Percept.from_observation(global_state(swarm, layout)[0], layout))
-    np.testing.assert_allclose(fields[1]["velocity"] - fields[0]["velocity"], turned(FLOW, moved), atol=1e-5)
+    flow = sonar.to_body(FLOW[None], moved.heading[0])
+    np.testing.assert_allclose(fields[1]["velocity"] - fields[0]["velocity"], flow, atol=1e-5)
     np.testing.assert_array_equal(fields[1]["yaw_rate"], fields[0]["yaw_rate"])
 
 
@@ -77,8 +71,7 @@ def sailed():
 def test_a_recording_tells_the_water_at_every_vehicle(sailed):
     """Whose velocity over ground is that of the water once it does nothing."""
     field = Scenes(sailed).at(5.0).water
-    swarm = Swarm(sailed.scenario)
-    swarm.reset(0)
+    swarm = started(sailed.scenario)
     for _ in range(50):
         swarm.step(np.zeros((1, 5, 2)))
     np.testing.assert_allclose(field.at(swarm.state.eta[0, :, :2]), swarm.flow[0], atol=1e-6)

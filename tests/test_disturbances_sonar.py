@@ -8,11 +8,12 @@ import pytest
 from scipy.stats import kstest, norm
 
 import uuv_marl
+from tests import contract
+from tests.swarms import started
 from uuv_marl import load_scenario
 from uuv_marl.scenario import sonar_is_ideal
 from uuv_marl.sim.disturbances.noise import is_silent
 from uuv_marl.sim.disturbances.schedule import Reading, control_step_of, due, latest
-from uuv_marl.sim.swarm import Swarm
 
 CHANNELS = {"sonar.channels": ["compass", "link", "age", "ranged"]}
 SONAR = ("detected", "neighbour", "echo", "echo_range", "echo_position", "link_identity")
@@ -49,10 +50,9 @@ def near_obstacles(swarm):
     swarm.observe()
 
 
-def swim(overrides, decisions=40, seed=3, num_vehicles=12, scenario="single_obstacle", idle=False):
+def swim(overrides, decisions=40, num_vehicles=12, scenario="single_obstacle", idle=False):
     """A run with actions that don't depend on disturbances: observed and true values at every decision."""
-    swarm = Swarm(load_scenario(scenario, num_vehicles=num_vehicles, overrides=CHANNELS | overrides))
-    swarm.reset(seed)
+    swarm = started(scenario, CHANNELS | overrides, seed=3, n=num_vehicles)
     if swarm.world_map.num_obstacles[0]:
         near_obstacles(swarm)
     rng, frames = np.random.default_rng(7), []
@@ -85,8 +85,13 @@ def arrays_of(swarm):
 def in_body(frame, north, east):
     """Points of the world (vehicle, ...) in each vehicle's body frame."""
     x, y, psi = (column.reshape(-1, *[1] * (np.ndim(north) - 1)) for column in frame["eta"].T)
-    dx, dy = north - x, east - y
-    return np.stack([np.cos(psi) * dx + np.sin(psi) * dy, np.cos(psi) * dy - np.sin(psi) * dx], -1)
+    return turned(north - x, east - y, psi)
+
+
+def turned(x, y, angle):
+    """Vectors in axes that are turned clockwise by an angle."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * x + s * y, c * y - s * x], -1)
 
 
 def same(ours, theirs, names=SONAR, where=np.s_[:]):
@@ -151,12 +156,9 @@ def test_a_compensated_echo_is_where_the_obstacle_is(reports):
         if reports == "centre":
             points = np.broadcast_to(in_body(now, x, y)[:, None], now["echo_position"].shape)
         else:
-            c, s = np.cos(then["eta"][:, 2, None]), np.sin(then["eta"][:, 2, None])
             ahead, abeam = np.moveaxis(then["echo_position"].astype(float), -1, 0)
-            north, east = (
-                then["eta"][:, k, None] + part for k, part in enumerate((c * ahead - s * abeam, s * ahead + c * abeam))
-            )
-            points = in_body(now, north, east)
+            places = then["eta"][:, None, :2] + turned(ahead, abeam, -then["eta"][:, 2, None])
+            points = in_body(now, *np.moveaxis(places, -1, 0))
         np.testing.assert_allclose(now["echo_position"][seen], points[seen], atol=1e-4)
         moved = np.hypot(*np.moveaxis(points, -1, 0)) - np.hypot(*np.moveaxis(then["echo_position"], -1, 0))
         np.testing.assert_allclose(now["echo_range"][seen], (then["echo_range"] + moved)[seen], atol=1e-3)
@@ -187,9 +189,7 @@ def test_sound_shows_vehicles_where_they_were():
             for later in (0, 1)
         ]
         was = places[0] + (ago - whole)[:, None] * (places[1] - places[0])
-        x, y, psi = now["eta"][i].T
-        dx, dy = was[:, 0] - x, was[:, 1] - y
-        expected = np.stack([np.cos(psi) * dx + np.sin(psi) * dy, np.cos(psi) * dy - np.sin(psi) * dx], 1)
+        expected = turned(*(was - now["eta"][i, :2]).T, now["eta"][i, 2])
         np.testing.assert_allclose(now["neighbour"][i, k], expected, atol=1e-3)
     _, ideal = swim({})
     same(frames[-1], ideal[-1], ("detected", "echo", "echo_range", "echo_position", "who"))
@@ -249,8 +249,7 @@ def test_a_passive_range_has_a_factor_that_lasts():
             scale = factor[:, None, None] if array.kind == "passive" else 1.0
             expected = scale * theirs["neighbour"][:, sectors]
             np.testing.assert_allclose(ours["neighbour"][:, sectors], expected, rtol=1e-5)
-    drawn = Swarm(load_scenario("single_obstacle", overrides=FACTOR), 200)
-    drawn.reset(0)
+    drawn = started("single_obstacle", FACTOR, worlds=200)
     is_normal(np.log(drawn._disturbances.sensor_errors.factor.ravel()) / 0.3, 10_000)
 
 
@@ -292,8 +291,7 @@ def test_the_probability_of_detection_falls_with_range_as_given():
 @pytest.mark.parametrize(("probability", "length"), [(0.3, 20), (0.05, 5), (0.1, 1), (1.0, 3)])
 def test_outages_have_the_given_rate_and_length(probability, length):
     overrides = {"noise.silence_probability": probability, "noise.silence_readings": length}
-    swarm = Swarm(load_scenario("starter", num_vehicles=1, overrides=overrides))
-    swarm.reset(0)
+    swarm = started("starter", overrides, n=1)
     own, num, silent_at = swarm._disturbances, 100_000, getattr(is_silent, "py_func", is_silent)
     silent = np.array(
         [silent_at(Reading(0, 1, m, m, 0), 0, own.keys[0], own.noise, own.sensor_errors) for m in range(num)]
@@ -323,8 +321,7 @@ def test_a_silent_array_detects_nothing_and_the_others_all():
 @pytest.mark.parametrize("probability", [0.02, 0.2])
 def test_false_echoes_have_their_rate_and_fill_their_sub_sectors(probability):
     overrides = CHANNELS | {"obstacles": [], "noise.false_echo_probability": probability}
-    swarm = Swarm(load_scenario("starter", num_vehicles=1, overrides=overrides))
-    swarm.reset(0)
+    swarm = started("starter", overrides, n=1)
     frames = []
     for _ in range(5000):
         swarm.step(np.zeros((1, 1, 2)))
@@ -408,9 +405,7 @@ def test_one_disturbance_changes_no_missed_detection(own, other):
 
 def drift_of(frame):
     """Each vehicle's position error, from its vector to l(t); shape (vehicle, 2)."""
-    c, s = np.cos(frame["eta"][:, 2]), np.sin(frame["eta"][:, 2])
-    ahead, abeam = frame["reference"].astype(float).T
-    return frame["l"][:2] - np.stack([c * ahead - s * abeam, s * ahead + c * abeam], 1) - frame["eta"][:, :2]
+    return frame["l"][:2] - turned(*frame["reference"].astype(float).T, -frame["eta"][:, 2]) - frame["eta"][:, :2]
 
 
 def test_position_drifts_by_a_share_of_the_distance_travelled():
@@ -439,12 +434,9 @@ def test_a_compass_has_a_constant_bias():
             np.testing.assert_allclose(ours[name].astype(float) @ [1, 1j], expected, atol=1e-4)
         same(ours, theirs)
     np.testing.assert_allclose(angles, np.broadcast_to(angles[0], np.shape(angles)), atol=1e-6)
-    drawn = Swarm(load_scenario("single_obstacle", overrides=COMPASS), 200)
-    drawn.reset(0)
-    is_normal(
-        np.arctan2(*np.moveaxis(drawn._disturbances.navigation_errors.bias, -1, 0)[::-1]).ravel() / math.radians(10.0),
-        10_000,
-    )
+    drawn = started("single_obstacle", COMPASS, worlds=200)
+    bias = polar(drawn._disturbances.navigation_errors.bias)[1]
+    is_normal(bias.ravel() / math.radians(10.0), 10_000)
 
 
 def test_drift_displaces_compensated_readings():
@@ -453,10 +445,9 @@ def test_drift_displaces_compensated_readings():
     _, true = swim(CARRIED, 60)
     for t in range(5, 61):
         i, k = np.nonzero(frames[t]["detected"])
-        c, s = np.cos(frames[t]["eta"][i, 2]), np.sin(frames[t]["eta"][i, 2])
-        north, east = (drift_of(frames[t]) - drift_of(frames[t - 5]))[i].T
+        drift = (drift_of(frames[t]) - drift_of(frames[t - 5]))[i]
         off = frames[t]["neighbour"].astype(float)[i, k] - true[t]["neighbour"][i, k]
-        np.testing.assert_allclose(off, -np.stack([c * north + s * east, c * east - s * north], 1), atol=2e-3)
+        np.testing.assert_allclose(off, -turned(*drift.T, frames[t]["eta"][i, 2]), atol=2e-3)
 
 
 # --- Everything ---
@@ -470,11 +461,17 @@ HARSH = {
 FAR = {"noise.silence_probability": 1.0, "noise.nominal_range_m": 4096.0, "noise.passive_ranges": False}
 
 
-@pytest.mark.parametrize("harsh", [EVERYTHING, HARSH, FAR])
-def test_observations_stay_within_their_space(harsh):
-    env = uuv_marl.parallel_env(load_scenario("single_obstacle", num_vehicles=5, overrides=CHANNELS | harsh))
+CURRENT = {"current.speed_mps": 2.0, "current.variation_mps": 1.0, "current.eddies": 16, "current.eddy_speed_mps": 2.0}
+EVERY_CHANNEL = {"sonar.channels": ["compass", "link", "current", "age", "ranged", "modem"]}
+
+
+@pytest.mark.parametrize("harsh", [EVERYTHING, HARSH, FAR], ids=["everything", "harsh", "far"])
+@pytest.mark.parametrize("more", [{}, CURRENT, contract.MEDIUM], ids=["sonar", "current", "medium"])
+def test_observations_stay_within_their_space(more, harsh):
+    changes = more | harsh | EVERY_CHANNEL
+    env = uuv_marl.vector_env(8, "random_field", num_vehicles=5, overrides=changes)
     observations, _ = env.reset(seed=0)
-    space = env.observation_space("uuv_0")
     for _ in range(200):
-        assert all(space.contains(observation) for observation in observations.values())
-        observations, *_ = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+        assert env.observation_space.contains(observations)
+        observations, rewards, *_ = env.step(env.action_space.sample())
+        assert np.isfinite(rewards).all()

@@ -10,9 +10,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Literal, get_args, get_origin
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from research.episodes import measured, read_rows, select
+from tests.processes import module_of
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
 from uuv_marl.cli import app
@@ -66,9 +69,7 @@ def test_python_blocks_run_and_show_something(block, capsys, tmp_path, monkeypat
 
 
 def test_the_gallery_shows_every_task_and_is_as_its_tool_makes_it():
-    spec = importlib.util.spec_from_file_location("make_gallery", ROOT / "tools" / "make_gallery.py")
-    gallery = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(gallery)
+    gallery = module_of(ROOT / "tools" / "make_gallery.py")
     assert (ROOT / "docs" / "gallery.md").read_text() == gallery.page()
     films = list(gallery.FOLDER.iterdir())
     assert {path.stem for path in films} == {film.name for film in gallery.FILMS}
@@ -149,15 +150,8 @@ def test_toml_blocks_are_scenarios(block, tmp_path):
     assert load_scenario(tmp_path / "mine.toml").title
 
 
-def tool():
-    spec = importlib.util.spec_from_file_location("write_tables", ROOT / "tools" / "write_tables.py")
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
-    return made
-
-
 def test_generated_tables_are_those_of_the_code():
-    tables = tool()
+    tables = module_of(ROOT / "tools" / "write_tables.py")
     for page in tables.PAGES:
         assert page.read_text() == tables.written(page), f"{page.name}: run python tools/write_tables.py"
     marked = re.findall(r"^<!-- (\w+) -->$", "".join(page.read_text() for page in tables.PAGES), flags=re.M)
@@ -209,3 +203,17 @@ def switches(model, prefix=""):
 @pytest.mark.parametrize("field", list(switches(Scenario)))
 def test_every_switch_of_a_scenario_is_on_a_page(field):
     assert any(field.rpartition(".")[2] in page.read_text() for page in PAGES)
+
+
+@pytest.mark.parametrize("policy", ["bio_inspired", "sff", "sdc"])
+def test_the_table_is_that_of_other_shipped_episodes(policy):
+    rows = select(read_rows(ROOT / "docs" / "paper.csv.gz"), scenario="single_obstacle", policy=policy)
+    middle = np.sort(measured(rows, "task_time_s"))[len(rows) // 4 : -len(rows) // 4].mean()
+    (line,) = re.findall(rf"\| (`{policy}`.*?) \|(?= \||\s*<)", " ".join(README.read_text().split()))
+    assert line.split(" | ")[1].split(", ")[0] == f"{middle + 1e-9:.1f} s"
+
+
+def test_make_help_lists_every_target_that_is_named():
+    makefile = (ROOT / "Makefile").read_text()
+    for target in re.findall(r"(?:^|`|; |: )make ([a-z-]+)", README.read_text(), re.M):
+        assert re.search(rf'@echo "make {target}\b', makefile) or target == "help", target

@@ -1,7 +1,6 @@
 """Whatever enters compiled code is checked first: percepts of others, snapshots, masks; and a runaway is named."""
 
 import io
-import logging
 import shutil
 import subprocess
 import sys
@@ -11,10 +10,11 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 import typer
-from typer.testing import CliRunner
 
 import uuv_marl
 from tests.nets import ANYWHERE
+from tests.processes import cli
+from tests.swarms import piloted, started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES, PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import load_checkpoint, save_checkpoint
@@ -23,7 +23,6 @@ from uuv_marl.benchmark.results import Results, load_trace
 from uuv_marl.cli import app, main
 from uuv_marl.cli.console import _width, console
 from uuv_marl.errors import DivergenceError
-from uuv_marl.extras import silenced
 from uuv_marl.paths import user_path
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.replay.page import write_page
@@ -31,30 +30,24 @@ from uuv_marl.replay.record import record
 from uuv_marl.scenario import show, show_vehicle
 from uuv_marl.scenario.vehicle_files import VEHICLES
 from uuv_marl.sim import model as model_module
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.vehicle import plant
 
 
 def made_for(name, n=5, worlds=2):
-    scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=n))
-    swarm = Swarm(scenario, worlds)
-    policy = make_policy(name, scenario, worlds)
-    policy.reset(0)
-    return swarm, policy, swarm.reset(0)
+    swarm, policy = piloted(name, "single_obstacle", worlds=worlds, n=n)
+    return policy, swarm.percept
 
 
 @pytest.mark.parametrize("name", ANYWHERE)
 def test_percepts_of_others_are_refused(name):
     """Compiled code would read, and write memory, beyond the ends of the policy's arrays."""
-    _, policy, percept = made_for(name)
+    policy, percept = made_for(name)
     good = policy.act(percept)
     assert good.shape == (2, 5, 2)
-    more_worlds = made_for(name, worlds=8)[2]
-    more_vehicles = made_for(name, n=54)[2]
     other_suite = PerceptLayout.of(load_scenario("single_obstacle", overrides={"sonar.arrays.bow.sub_sectors": 3}))
     for other in (
-        more_worlds,
-        more_vehicles,
+        made_for(name, worlds=8)[1],
+        made_for(name, n=54)[1],
         Percept(percept.flat[:1], percept.layout),
         Percept(percept.flat[:, :4], percept.layout),
         Percept(percept.flat.astype(np.float64), percept.layout),
@@ -71,8 +64,8 @@ def test_percepts_of_others_are_refused(name):
 
 @pytest.mark.parametrize("name", ["sdc", "sff", "olfati_saber_informed", "orca_informed"])
 def test_no_number_of_an_observation_is_an_index(name):
-    """An identity beyond the swarm, a fraction or NaN is nobody's, never another vehicle's place in memory."""
-    _, policy, percept = made_for(name)
+    """An identity beyond the swarm, a fraction or NaN is never another vehicle's place in memory."""
+    policy, percept = made_for(name)
     policy.act(percept)
     identity = percept["link_identity"]
     percept["detected"][...] = 1.0
@@ -88,8 +81,7 @@ def test_a_swarm_too_large_to_assign_slots_is_refused_at_once():
 
 @pytest.mark.parametrize("active", [[True], np.ones(8), np.ones((8, 1), bool), np.ones(9, bool)])
 def test_a_mask_of_other_worlds_is_refused(active):
-    swarm = Swarm(load_scenario("tracking", num_vehicles=2), 8)
-    swarm.reset(0)
+    swarm = started("tracking", worlds=8, n=2)
     with pytest.raises(ValueError, match="active must be bool of shape"):
         swarm.step(np.zeros((8, 2, 2), np.float32), np.asarray(active))
 
@@ -109,22 +101,23 @@ def test_a_mask_of_other_worlds_is_refused(active):
     ],
 )
 def test_a_snapshot_holds_no_index_out_of_range(name, value):
-    scenario = load_scenario("lossy", num_vehicles=6, overrides={"losses.times_s": [1.0]})
-    swarm = Swarm(scenario, 2)
-    swarm.reset(0)
+    swarm = started("lossy", {"losses.times_s": [1.0]}, worlds=2, n=6)
     before, snapshot = swarm.snapshot(), swarm.snapshot()
     snapshot[name][0] = value
     snapshot["eta"][...] = 5.0
     with pytest.raises(ValueError, match=name):
         swarm.restore(snapshot)
     assert np.array_equal(swarm.snapshot()["eta"], before["eta"]), "half a snapshot was taken"
+    if name == "num_obstacles":  # a state changed by hand is checked, too
+        swarm.world_map.num_obstacles[0] = value
+        with pytest.raises(ValueError, match=name):
+            swarm.observe()
 
 
 @pytest.mark.parametrize("change", ["missing", "shape", "type"])
 @pytest.mark.parametrize("name", ["eta", "tick", "streams", "keys", "percept"])
 def test_a_snapshot_of_another_swarm_is_refused(name, change):
-    swarm = Swarm(load_scenario("tracking", num_vehicles=3), 2)
-    swarm.reset(0)
+    swarm = started("tracking", worlds=2, n=3)
     snapshot = swarm.snapshot()
     array = snapshot.pop(name)
     if change == "shape":
@@ -133,14 +126,6 @@ def test_a_snapshot_of_another_swarm_is_refused(name, change):
         snapshot[name] = array.astype(np.complex64)
     with pytest.raises(ValueError, match=name):
         swarm.restore(snapshot)
-
-
-def test_state_changed_by_hand_is_checked():
-    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=2))
-    swarm.reset(0)
-    swarm.world_map.num_obstacles[0] = 50
-    with pytest.raises(ValueError, match="num_obstacles"):
-        swarm.observe()
 
 
 @pytest.fixture
@@ -156,8 +141,7 @@ def runaway(monkeypatch):
 
 @pytest.mark.parametrize("worlds", [1, 3])
 def test_divergence_is_named_where_it_happens_and_ends_the_world(runaway, worlds, caplog):
-    swarm = Swarm(runaway, worlds)
-    swarm.reset(0)
+    swarm = started(runaway, worlds=worlds)
     assert not swarm.ended.any()
     action = np.zeros((worlds, 4, 2), np.float32)
     action[0, 2] = 1.0, 0.0  # one vehicle of one world is the first
@@ -246,7 +230,7 @@ def test_every_door_of_a_path_in_python_knows_the_home_folder(home):
     assert "lauv" in show("~/mine.toml")
     assert "lauv" in show_vehicle("~/v.toml")
     for arguments in (["list", "--show", "~/mine.toml"], ["list", "vehicles", "--show", "~/v.toml"]):
-        assert CliRunner().invoke(app, arguments).exit_code == 0
+        assert cli(*arguments)[0] == 0
     trained = POLICIES["mappo"]
     (home / "best").mkdir()
     save_checkpoint("~/best/policy.safetensors", trained.checkpoint.card, trained.checkpoint.tensors)
@@ -354,11 +338,3 @@ for arguments in {lines!r}:
     run = [sys.executable, "-OO", "-c", code]
     done = subprocess.run(run, cwd=tmp_path, capture_output=True, encoding="utf-8", check=False)
     assert done.returncode == 0, done.stderr[-2000:]
-
-
-def test_what_libraries_are_told_is_taken_back():
-    log = logging.getLogger("some.library")
-    log.setLevel(logging.INFO)
-    with silenced("some.library", logging.ERROR):
-        assert log.level == logging.ERROR
-    assert log.level == logging.INFO

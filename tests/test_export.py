@@ -4,15 +4,14 @@ import numpy as np
 import onnx
 import pytest
 from onnx.reference import ReferenceEvaluator
-from typer.testing import CliRunner
 
 from tests.nets import card_for, saved, tensors
+from tests.processes import cli
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import POLICIES, PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
 from uuv_marl.baselines.learned.export import write_onnx
 from uuv_marl.baselines.learned.trained import Trained
-from uuv_marl.cli import app
 
 BOW = {"name": "bow", "kind": "active", "mounting_deg": 0.0, "aperture_deg": 90.0, "range_m": 80.0, "sub_sectors": 5}
 RING = {
@@ -63,16 +62,13 @@ def test_what_was_trained_for_something_else_is_refused(tmp_path):
 
 def test_the_command(tmp_path):
     best, output = saved(tmp_path, load_scenario("starter"), memory=True), tmp_path / "policy.onnx"
-    done = CliRunner().invoke(app, ["export", best, str(output)])
-    assert done.exit_code == 0, done.output
+    assert cli("export", best, output)[0] == 0
     assert ReferenceEvaluator(str(output)).input_names == ["observation", "state"]
     other = {"sonar.arrays.bow.sub_sectors": 5}  # the training's scenario is found by what the checkpoint says
     card = card_for(load_scenario("starter", overrides=other), training={"scenario": "starter", "overrides": other})
     save_checkpoint(tmp_path / "other" / WEIGHTS_FILE, card, tensors(card))
-    done = CliRunner().invoke(app, ["export", str(tmp_path / "other"), str(output)])
-    assert done.exit_code == 0, done.output
-    unwritable = CliRunner().invoke(app, ["export", best, "/dev/null/policy.onnx"])
-    assert unwritable.exit_code == 2
+    assert cli("export", tmp_path / "other", output)[0] == 0
+    assert cli("export", best, "/dev/null/policy.onnx")[0] == 2
 
 
 @pytest.mark.parametrize("name", [name for name, kind in POLICIES.items() if isinstance(kind, Trained)])
@@ -80,20 +76,8 @@ def test_a_shipped_network_is_exported_by_its_name(name, tmp_path, monkeypatch):
     """Also where a folder of that name lies: a path to it is ./NAME."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / name).mkdir()
-    done = CliRunner().invoke(app, ["export", name, "policy.onnx"])
-    assert done.exit_code == 0, done.output
+    assert cli("export", name, "policy.onnx")[0] == 0
     said = {entry.key: entry.value for entry in onnx.load("policy.onnx").metadata_props}
     assert said["checkpoint"] == POLICIES[name].checkpoint.digest == load_checkpoint(name).digest
     with pytest.raises(PolicyError, match=r"can't be read"):
         load_checkpoint(f"./{name}")
-
-
-def test_the_command_names_what_it_can_not_export():
-    for policy, told in {
-        "scout": "not controllers",
-        "mapo": "did you mean 'mappo'",
-        "runs/none": "can't be read",
-    }.items():
-        done = CliRunner().invoke(app, ["export", policy, "policy.onnx"])
-        assert done.exit_code == 2
-        assert told in done.output

@@ -3,26 +3,24 @@
 import numpy as np
 import pytest
 
+from tests.swarms import fly, piloted, started
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make_policy, with_policy_requirements
-from uuv_marl.benchmark.evaluate import episodes
+from uuv_marl.baselines import make_policy
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.envs.state import global_state, state_layout
-from uuv_marl.sim.swarm import Swarm
 
 TIERS = ("few_informed_easy", "few_informed", "few_informed_hard")
 N, K = 20, 3
 KNOWN = {"swarm.num_vehicles": N, "task.informed": K}
 
 
-def water(worlds=1, **changes):
-    return Swarm(load_scenario("few_informed", overrides=KNOWN | changes), worlds)
+def water(worlds=1, seed=0, **changes):
+    return started("few_informed", KNOWN | changes, worlds, seed)
 
 
 @pytest.mark.parametrize("k", [1, 7, 40])
 def test_so_many_are_informed_and_each_episode_draws_who(k):
     swarm = water(6, **{"task.informed": k})
-    swarm.reset(0)
     informed = swarm.world_map.informed.copy()
     assert (informed.sum(axis=1) == min(k, N)).all()
     np.testing.assert_array_equal(swarm.percept["informed"][..., 0], informed)
@@ -36,8 +34,7 @@ def test_so_many_are_informed_and_each_episode_draws_who(k):
 
 @pytest.mark.parametrize("sea", [{}, {"navigation.drift_share": 0.1, "navigation.compass_bias_deg": 5.0}])
 def test_two_courses_with_equal_sonar_give_the_uninformed_equal_percepts(sea):
-    swarm = water(1, **sea)
-    swarm.reset(1)
+    swarm = water(1, 1, **sea)
     swarm.world_map.num_obstacles[0] = 0
     informed, (c, s) = swarm.world_map.informed[0], (np.cos(2.0), np.sin(2.0))
     snapshot, seen = swarm.snapshot(), []
@@ -55,8 +52,7 @@ def test_two_courses_with_equal_sonar_give_the_uninformed_equal_percepts(sea):
 
 @pytest.mark.parametrize("name", TIERS)
 def test_the_start_is_turned_at_random_against_the_first_leg_and_clear_of_obstacles(name):
-    swarm = Swarm(load_scenario(name), 64)
-    swarm.reset(10_000)
+    swarm = started(name, worlds=64, seed=10_000)
     first, second = swarm.world_map.waypoints[:, 0, 0], swarm.world_map.waypoints[:, 0, 1]
     behind, leg = first - swarm.state.eta[:, :, :2].mean(axis=1), second - first
     angle = np.arctan2(leg[:, 0] * behind[:, 1] - leg[:, 1] * behind[:, 0], (leg * behind).sum(axis=1))
@@ -67,10 +63,8 @@ def test_the_start_is_turned_at_random_against_the_first_leg_and_clear_of_obstac
 
 def test_who_does_not_perceive_the_reference_reckons_where_it_is():
     """Its map does not move with it. Random actions, so that it turns and comes to no rest."""
-    swarm, rng = water(), np.random.default_rng(3)
+    swarm, rng = water(seed=10_001), np.random.default_rng(3)
     policy = make_policy("leader_follower", swarm.scenario)
-    swarm.reset(10_001)
-    policy.reset(10_001)
     origin = turn = None
     began = swarm.state.eta[0, :, :2].copy()
     moved = np.zeros(N)
@@ -95,9 +89,9 @@ def test_who_does_not_perceive_the_reference_reckons_where_it_is():
 
 
 def test_newcomers_begin_at_the_references_velocity_for_the_informed_alone():
-    swarm = water()
+    swarm = water(seed=10_002)
     policy = make_policy("leader_follower", swarm.scenario)
-    policy.update_memory(swarm.reset(10_002))
+    policy.update_memory(swarm.percept)
     known = policy.memory.known[0] > 0.0
     speed = np.hypot(*np.moveaxis(policy.memory.velocity[0], -1, 0))
     informed = swarm.world_map.informed[0]
@@ -137,20 +131,7 @@ def test_there_is_at_the_end_once_the_reference_rests_and_who_touched_something_
 
 
 def test_where_all_are_informed_there_is_no_headline():
-    swarm = water(1, **{"task.informed": N})
-    swarm.reset(0)
-    assert swarm.task.metrics(0)["uninformed_share"] is None
-
-
-def test_followers_come_along_only_with_the_law_that_is_made_for_it():
-    """On tuning seeds of the easy tier: ``scout`` brings the informed alone, the law nearly all."""
-    share = {}
-    for name in ("leader_follower", "scout"):
-        scenario = with_policy_requirements(name, load_scenario("few_informed_easy"))
-        runs = list(episodes(scenario, name, range(10_000, 10_004)))
-        share[name] = np.mean([run.metrics["task"]["uninformed_share"] for run in runs])
-    assert share["leader_follower"] > 0.7
-    assert share["scout"] < 0.2
+    assert water(**{"task.informed": N}).task.metrics(0)["uninformed_share"] is None
 
 
 def test_a_swarm_that_amplifies_what_it_hears_goes_at_the_cruise_of_its_followers():
@@ -158,11 +139,8 @@ def test_a_swarm_that_amplifies_what_it_hears_goes_at_the_cruise_of_its_follower
     speeds = []
     for cruise in (1.0, 2.0):
         name = f"leader_follower,follow=2,cruise={cruise},gather=0,push=0"
-        swarm = Swarm(load_scenario("few_informed"), 4)
-        policy, percept = make_policy(name, swarm.scenario, 4), swarm.reset(10_000)
-        policy.reset(10_000)
-        for _ in range(100):
-            percept = swarm.step(policy.act(percept))
+        swarm, policy = piloted(name, "few_informed", worlds=4, seed=10_000)
+        fly(swarm, policy, 100)
         speed = np.hypot(swarm.state.nu[..., 0], swarm.state.nu[..., 1])[~swarm.world_map.informed]
         assert speed.max() < cruise + 0.4
         speeds.append(np.median(speed) / cruise)
@@ -183,13 +161,10 @@ def test_who_leads_is_paid_for_who_follows():
 
 def test_who_has_no_gamma_agent_keeps_its_velocity():
     """The uninformed of Su, Wang and Lin neither brake nor go anywhere by themselves."""
-    swarm = Swarm(load_scenario("few_informed", num_vehicles=2, overrides={"task.informed": 1}))
-    policy = make_policy("olfati_saber", swarm.scenario)
-    swarm.reset(0)
+    swarm, policy = piloted("olfati_saber", "few_informed", {"task.informed": 1}, n=2)
     alone = int(np.flatnonzero(~swarm.world_map.informed[0])[0])
     swarm.state.eta[0, alone, :2] += 5000.0
     swarm.state.nu[0, alone] = (1.5, 0.0, 0.0)
-    percept = swarm.observe()
-    for _ in range(40):
-        percept = swarm.step(policy.act(percept))
+    swarm.observe()
+    fly(swarm, policy, 40)
     np.testing.assert_allclose(swarm.state.nu[0, alone], (1.5, 0.0, 0.0), atol=0.05)

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from tests.swarms import started
 from tests.test_rendering import SIZE, played
 from tests.test_tasks import TWO
 from uuv_marl import load_scenario
@@ -16,7 +17,6 @@ from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.replay.encode import payload
 from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.groups import groups_of
 
 SHORT = {"time_limit.factor": 0.02, "time_limit.extra_s": 6.0}
@@ -109,8 +109,7 @@ def test_one_group_of_informed_vehicles_is_drawn_as_ever(few):
 @pytest.mark.parametrize("name", ["two_swarms", "few_informed_easy"])
 def test_recordings_and_pages_know_the_groups(name):
     whole = record(load_scenario(name, overrides=SHORT), "idle", 0)
-    swarm = Swarm(whole.scenario)
-    swarm.reset(0)
+    swarm = started(whole.scenario)
     for one in (whole, Scenes(whole).at(3.0)):
         for got, wanted in zip(one.groups[:2], groups_of(swarm)[:2], strict=True):
             np.testing.assert_array_equal(got, wanted)

@@ -4,17 +4,16 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
-from uuv_marl import load_scenario
+from tests.swarms import started
 from uuv_marl.errors import ScenarioError
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cells, reached
 from uuv_marl.tasks.maps.kinds import KINDS
 
 SEEDS = range(8)
 
 
-def water(kind, worlds=1, **changes):
-    return Swarm(load_scenario("hard_water", overrides={"task.kinds": [kind], **changes}), worlds)
+def water(kind, **changes):
+    return started("hard_water", {"task.kinds": [kind], **changes})
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -45,23 +44,6 @@ def test_every_map_can_be_passed_from_each_start_with_its_clearance(kind):
         assert (task.path_lengths() < 3.0 * swarm.facts.away).all()
 
 
-def test_a_map_depends_on_its_seed_alone():
-    changes = {"task.kinds": list(KINDS)}
-    batch = Swarm(load_scenario("hard_water", overrides=changes), 6)
-    batch.reset(40)
-    for w in (0, 3, 5):
-        alone = Swarm(load_scenario("hard_water", overrides=changes))
-        alone.reset(40 + w)
-        for mine, theirs in (
-            (alone.world_map, batch.world_map),
-            (alone.state, batch.state),
-            (alone.task.memory, batch.task.memory),
-        ):
-            for name, array in mine._asdict().items():
-                np.testing.assert_array_equal(array[0], theirs._asdict()[name][w], err_msg=name)
-    assert len({int(kind) for kind in batch.task.memory.kind}) > 2
-
-
 def test_free_cells_and_ways_are_those_of_brute_force():
     grid, rng = MapGrid(-20.0, -15.0, 30, 25), np.random.default_rng(0)
     discs = np.concatenate([rng.uniform(-20, 50, (6, 2)), rng.uniform(2, 6, (6, 1))], axis=1)
@@ -80,23 +62,9 @@ def test_free_cells_and_ways_are_those_of_brute_force():
     assert (empty <= straight / np.cos(np.radians(13.3)) + 1e-9).all()  # the widest gap between two steps
 
 
-def test_percepts_turn_with_a_map():
-    swarm = water("forest")
-    swarm.reset(3)
-    swarm.state.eta[0, :, :2] *= 0.2
-    before = swarm.observe().flat.copy()
-    angle, shift = 0.7, np.array([40.0, -25.0])
-    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    for places in (swarm.state.eta[0, :, :2], swarm.world_map.obstacles[0, :, :2], swarm.world_map.waypoints[0, 0]):
-        places[...] = places @ turn + shift
-    swarm.state.eta[0, :, 2] += angle
-    np.testing.assert_allclose(swarm.observe().flat, before, atol=2e-4)
-
-
 def test_there_is_along_the_free_way():
     """Behind a wall a vehicle may be near the goal, and is not there."""
     swarm = water("gate", **{"task.near_m": 60.0})
-    swarm.reset(0)
     task, goal = swarm.task, swarm.world_map.waypoints[0, 0, 1]
     swarm.state.eta[0, :, :2] = goal + 4.0 * np.arange(10)[:, None]
     swarm.observe()
@@ -105,22 +73,8 @@ def test_there_is_along_the_free_way():
     assert not task.at_goal().any()
 
 
-@pytest.mark.parametrize(("changes", "message"), [
-    ({"task.kinds": ["gates"]}, "task.kinds must name some of pocket, bar, .*got .'gates'."),
-    ({"task.kinds": []}, "task.kinds must name some of"),
-    ({"task.gate.gap_m": [20.0, 10.0]}, r"task.gate.gap_m must be \[low, high\] with low <= high, got \[20.0, 10.0\]"),
-    ({"task.bar.hole_m": 3.0}, "task.bar.hole_m is unknown"),
-    ({"task.length_m": [150.0, 400.0]}, r"task.length_m must be at least 167, task.first_wall_m and task.goal_clear_m"),
-    ({"task.piles.apart_m": [0.0, 0.0]}, "task.piles.apart_m.0 must be greater than or equal to 0.001"),
-    ({"task.bar.radius_m": [0.0, 2.0]}, "task.bar.radius_m.0 must be greater than or equal to 0.001"),
-])  # fmt: skip
-def test_numbers_that_can_not_be_are_refused(changes, message):
-    with pytest.raises(ScenarioError, match=message):
-        load_scenario("hard_water", overrides=changes)
-
-
 def test_knobs_that_leave_no_way_are_refused_with_the_remedy():
     with pytest.raises(
         ScenarioError, match="of gate, none of them with a path at task.clearance_m = 3; widen the gaps"
     ):
-        water("gate", **{"task.gate.gap_m": [1.0, 2.0]}).reset(0)
+        water("gate", **{"task.gate.gap_m": [1.0, 2.0]})

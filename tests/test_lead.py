@@ -7,11 +7,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from tests.swarms import fly, piloted
 from tests.test_memory import room
-from uuv_marl import load_scenario
-from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.memory.actuators import answer, identify, lead
-from uuv_marl.sim.swarm import Swarm
 
 PERIOD_S = 0.1
 LAGS = st.floats(0.05, 2.0)
@@ -70,13 +68,12 @@ def test_with_a_lead_what_is_wanted_acts_after_one_period(lag_s, share, wanted, 
 )
 def test_with_a_lead_vehicles_do_not_swing(overrides, least):
     """The mean yaw rate on a leg is a fraction of that without; margins of two and more over what six seeds showed."""
-    scenario = with_policy_requirements("scout", load_scenario("tracking", num_vehicles=6, overrides=overrides))
     rates = []
     for share in (0.0, 1.0):
-        swarm, policy, rate = Swarm(scenario), make_policy("scout,preset=plus", scenario, lead=share), []
-        percept = swarm.reset(10_501)
+        swarm, policy = piloted("scout,preset=plus", "tracking", overrides, seed=10_501, n=6, lead=share)
+        rate = []
         for k in range(500):
-            percept = swarm.step(policy.act(percept))
+            fly(swarm, policy, 1)
             rate.append(np.abs(swarm.state.nu[0, :, 2]).mean() if k > 300 else 0.0)
         rates.append(sum(rate))
     assert rates[0] > least * rates[1]

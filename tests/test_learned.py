@@ -8,12 +8,12 @@ import pytest
 import safetensors.numpy
 
 from tests.nets import card_for, saved, tensors
-from uuv_marl import load_scenario
+from tests.swarms import fly, piloted, started
+from uuv_marl import evaluate, load_scenario
 from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint, vehicle_of
 from uuv_marl.baselines.learned.layers import ENCODED, Architecture, Network, NumpyOps, columns, shapes
 from uuv_marl.baselines.registry import policy_class
-from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.benchmark.results import policy_info
 from uuv_marl.errors import ScenarioError
 from uuv_marl.sim.swarm import Swarm
@@ -25,10 +25,6 @@ KINDS = [(kind, memory) for kind in ("mlp", "sectors", "moments") for memory in 
 
 def water(**overrides):
     return load_scenario("tracking", overrides={"actuators.yaw_damping_nms": 600.0, **overrides})
-
-
-def learned_file(folder):
-    return Path(folder) / WEIGHTS_FILE
 
 
 @pytest.fixture
@@ -127,58 +123,51 @@ def test_torch_and_numpy_give_the_same(kind, memory):
 @pytest.mark.parametrize(("kind", "memory"), KINDS)
 def test_a_run_depends_on_its_seed_alone(kind, memory, n, tmp_path):
     best = saved(tmp_path, water(), kind=kind, memory=memory)
-    scenario = with_policy_requirements(best, load_scenario("tracking", num_vehicles=n, overrides=SHORT))
-    together = {e.seed: e for e in episodes(scenario, best, [4, 5, 6]) if isinstance(e, Run)}
-    (alone,) = (e for e in episodes(scenario, best, [5]) if isinstance(e, Run))
-    assert together[5].metrics == alone.metrics
-    np.testing.assert_array_equal(together[5].routes.position, alone.routes.position)
+    scenario = load_scenario("tracking", num_vehicles=n, overrides=SHORT)
+    assert evaluate(best, scenario, [4, 5, 6])[1:2] == evaluate(best, scenario, [5])
 
 
 def test_a_memory_can_be_kept_and_is_forgotten_at_a_reset(tmp_path):
     best = saved(tmp_path, water(), memory=True)
-    scenario = with_policy_requirements(best, load_scenario("tracking", num_vehicles=4))
-    swarm, policy = Swarm(scenario, 2), make_policy(best, scenario, 2)
-    percept = swarm.reset([1, 2])
-    first = policy.act(percept).copy()
-    for _ in range(5):
-        percept = swarm.step(policy.act(percept))
+    swarm, policy = piloted(best, "tracking", worlds=2, seed=1, n=4)
+    first = policy.act(swarm.percept).copy()
+    percept = fly(swarm, policy, 5)
     kept, action = policy.snapshot(), policy.act(percept).copy()
-    other = make_policy(best, scenario, 2)
+    other = make_policy(best, swarm.scenario, 2)
     other.restore(kept)
     np.testing.assert_array_equal(other.act(percept), action)
-    forgetful = make_policy(best, scenario, 2).act(percept)
+    forgetful = make_policy(best, swarm.scenario, 2).act(percept)
     assert np.abs(forgetful - action).max() > 1e-3
     np.testing.assert_array_equal(policy.act(swarm.reset([1, 2])), first)
 
 
 @pytest.mark.parametrize(
-    ("beside", "told"),
+    ("beside", "policy_class"),
     [({}, "end to end"), ({"filter": True}, "end to end + filter"), ({"base_controller": "scout"}, "residual")],
 )
-def test_what_decides_beside_a_network_is_told_and_acts(beside, told, tmp_path):
-    """A network that says nothing leaves the law, or a filter around a vehicle at rest."""
+def test_what_decides_beside_a_network_is_declared_and_acts(beside, policy_class, tmp_path):
+    """A network with zero output leaves the base controller, or a filter around a vehicle at rest."""
     scenario = load_scenario("starter")
     best = saved(tmp_path, scenario, scale=0.0, **beside)
-    assert load_checkpoint(best).card.policy_class == told
-    policy, swarm = make_policy(best, scenario), Swarm(scenario)
-    law = make_policy(beside.get("base_controller", "idle,safety_filter=true" if beside else "idle"), scenario)
-    percept = swarm.reset(3)
+    assert load_checkpoint(best).card.policy_class == policy_class
+    policy, swarm = make_policy(best, scenario), started(scenario, seed=3)
+    alone = make_policy(beside.get("base_controller", "idle,safety_filter=true" if beside else "idle"), scenario)
     for _ in range(30):
-        action = policy.act(percept)
-        np.testing.assert_allclose(action, law.act(percept), atol=1e-6)
-        percept = swarm.step(action)
+        action = policy.act(swarm.percept)
+        np.testing.assert_allclose(action, alone.act(swarm.percept), atol=1e-6)
+        swarm.step(action)
 
 
 def test_it_works_for_any_size_and_declares_what_it_needs(best):
-    digest = load_checkpoint(learned_file(best)).digest
+    digest = load_checkpoint(Path(best) / WEIGHTS_FILE).digest
     known = {
         "channels": [], "yaw_damping_nms": 600.0, "decision_period_s": 0.1, "source": digest,
         "policy_class": "end to end",
     }  # fmt: skip
     assert policy_info(best) == known
     for n in (1, 200):
-        scenario = with_policy_requirements(best, load_scenario("tracking", num_vehicles=n))
-        assert make_policy(best, scenario).act(Swarm(scenario).reset(0)).shape == (1, n, 2)
+        swarm, policy = piloted(best, "tracking", n=n)
+        assert policy.act(swarm.percept).shape == (1, n, 2)
     with pytest.raises(PolicyError, match="yaw damping of 600.*with_policy_requirements"):
         make_policy(best, load_scenario("tracking"))
 
@@ -201,16 +190,16 @@ def test_another_percept_or_period_is_refused_with_the_remedy(best):
 
 
 def test_what_is_no_checkpoint_is_explained(best, tmp_path):
-    with pytest.raises(PolicyError, match="can't be read.*give a checkpoint"):
-        make_policy(str(tmp_path / "nowhere"), load_scenario("tracking"))
     (tmp_path / "bad").write_bytes(b"\x80\x04pickled")
-    with pytest.raises(PolicyError, match="holds no policy of uuv_marl"):
-        make_policy(str(tmp_path / "bad"), load_scenario("tracking"))
     (tmp_path / "other").write_bytes(safetensors.numpy.save({"x": np.zeros(2, np.float32)}))
-    with pytest.raises(PolicyError, match="holds no policy of uuv_marl"):
-        make_policy(str(tmp_path / "other"), load_scenario("tracking"))
-    with pytest.raises(PolicyError, match="did you mean 'bio_inspired'.*paths of checkpoints"):
-        make_policy("bio_inspred", load_scenario("tracking"))
+    for name, message in (
+        (tmp_path / "nowhere", "can't be read.*give a checkpoint"),
+        (tmp_path / "bad", "holds no policy of uuv_marl"),
+        (tmp_path / "other", "holds no policy of uuv_marl"),
+        ("bio_inspred", "did you mean 'bio_inspired'.*paths of checkpoints"),
+    ):
+        with pytest.raises(PolicyError, match=message):
+            make_policy(str(name), load_scenario("tracking"))
 
 
 def test_a_rewritten_checkpoint_is_loaded_anew(best):

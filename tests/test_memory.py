@@ -7,13 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uuv_marl import load_scenario
-from uuv_marl.baselines import make_policy, with_policy_requirements
+from tests.swarms import fly, piloted
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import age_of
 from uuv_marl.baselines.memory.response import follow, remains
 from uuv_marl.baselines.memory.surroundings import uncertainty
-from uuv_marl.sim.swarm import Swarm
 
 COURSE = {
     "trajectory.waypoints_m": [[150.0, 150.0], [450.0, 250.0], [350.0, 450.0]],
@@ -39,9 +37,8 @@ def run(overrides, seconds=140.0, policy="scout", seed=10_500):
     centres and surfaces within 40 m [m] and of the velocities of neighbours heard within 30 m [m/s]; the share of the
     confirmed discs that are no obstacle, and of the obstacles within 20 m that are not remembered.
     """
-    scenario = with_policy_requirements(policy, load_scenario("single_obstacle", overrides=COURSE | overrides))
-    swarm, acts = Swarm(scenario), make_policy(policy, scenario)
-    percept, period = swarm.reset(seed), scenario.timing.decision_period_s
+    swarm, acts = piloted(policy, "single_obstacle", COURSE | overrides, seed=seed)
+    percept, period = swarm.percept, swarm.scenario.timing.decision_period_s
     errors = {name: [] for name in ("place", "turn", "centre", "surface", "velocity")}
     found, missed, phantoms, discs, turn, origin = 0, 0, 0, 0, None, None
     for k in range(round(seconds / period)):
@@ -119,8 +116,7 @@ def test_what_remains_is_found_from_any_actions(a, share, drift, seed):
 
 def room():
     """What one vehicle remembers of nothing."""
-    scenario = with_policy_requirements("scout", load_scenario("tracking", num_vehicles=1))
-    return make_policy("scout", scenario).memory
+    return piloted("scout", "tracking", n=1)[1].memory
 
 
 @pytest.mark.parametrize("echoes", ["centre", "surface"])
@@ -159,15 +155,12 @@ def test_obstacles_are_known_in_a_disturbed_sea(disturbance, median, worst, phan
 
 
 def test_an_obstacle_that_is_gone_is_forgotten():
-    scenario = with_policy_requirements("scout", load_scenario("single_obstacle", num_vehicles=1))
-    swarm, policy = Swarm(scenario), make_policy("scout", scenario)
-    percept = swarm.reset(0)
+    swarm, policy = piloted("scout", "single_obstacle", n=1)
     while not (policy.memory.score[0, 0] >= 20.0).any():
-        percept = swarm.step(policy.act(percept))
+        fly(swarm, policy, 1)
     swarm.world_map.num_obstacles[0] = 0
-    percept = swarm.observe()
-    for _ in range(35):
-        percept = swarm.step(policy.act(percept))
+    swarm.observe()
+    fly(swarm, policy, 35)
     assert not (policy.memory.score[0, 0] >= CONFIRMED).any()
 
 
@@ -177,11 +170,8 @@ def test_a_reference_that_turns_little_by_little_does_not_turn_the_map(speed):
     angles = np.radians(np.arange(100) * 0.5)
     points = np.cumsum(np.column_stack([np.cos(angles), np.sin(angles)]) * (0.02 if speed < 1.0 else 2.0), axis=0)
     overrides = {"trajectory.waypoints_m": points.tolist(), "trajectory.speed_mps": speed, "obstacles": []}
-    scenario = with_policy_requirements(
-        "proportional_tracking,safety_filter=true", load_scenario("tracking", num_vehicles=1, overrides=overrides)
-    )
-    swarm, policy = Swarm(scenario), make_policy("proportional_tracking,safety_filter=true", scenario)
-    percept = swarm.reset(1)
+    swarm, policy = piloted("proportional_tracking,safety_filter=true", "tracking", overrides, seed=1, n=1)
+    percept = swarm.percept
     for k in range(400):
         action = policy.act(percept)
         if k == 0:
@@ -193,18 +183,11 @@ def test_a_reference_that_turns_little_by_little_does_not_turn_the_map(speed):
 
 
 def test_a_fix_that_is_cut_is_none():
-    scenario = with_policy_requirements(
-        "proportional_tracking,safety_filter=true", load_scenario("tracking", num_vehicles=1)
-    )
-    swarm, policy = Swarm(scenario), make_policy("proportional_tracking,safety_filter=true", scenario)
-    swarm.reset(0)
+    swarm, policy = piloted("proportional_tracking,safety_filter=true", "tracking", n=1)
     swarm.state.eta[0, 0, :2] = (-9000.0, 5000.0)
-    percept = swarm.observe()
-    policy.act(percept)
+    policy.act(swarm.observe())
     before, then = policy.memory.pose[0, 0, :2].copy(), swarm.state.eta[0, 0, :2].copy()
-    for _ in range(200):
-        percept = swarm.step(policy.act(percept))
-    policy.act(percept)
+    policy.act(fly(swarm, policy, 200))
     went = np.hypot(*(swarm.state.eta[0, 0, :2] - then))
     assert np.hypot(*(policy.memory.pose[0, 0, :2] - before)) == pytest.approx(went, rel=1e-3)
 
@@ -212,9 +195,7 @@ def test_a_fix_that_is_cut_is_none():
 @pytest.mark.parametrize("memory_s", [1.0, 2.0, 3.0])
 def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(memory_s):
     """Two vehicles at rest, beside each other; then one is gone."""
-    scenario = with_policy_requirements("scout", load_scenario("tracking", num_vehicles=2))
-    swarm, policy = Swarm(scenario), make_policy("scout", scenario, memory_s=memory_s)
-    swarm.reset(0)
+    swarm, policy = piloted("scout", "tracking", n=2, memory_s=memory_s)
     swarm.state.eta[0, 1, :2] = swarm.state.eta[0, 0, :2] + 20.0
     policy.act(swarm.observe())
     assert policy.memory.known[0, 0].any()
@@ -222,7 +203,7 @@ def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(memor
     silent_s = 0.0
     while policy.memory.known[0, 0].any() and silent_s < 10.0:
         policy.act(swarm.step(np.zeros((1, 2, 2), np.float32)))
-        silent_s += scenario.timing.decision_period_s
+        silent_s += swarm.scenario.timing.decision_period_s
     assert memory_s < silent_s < memory_s + 0.15
     assert age_of(0, 0, policy.memory) == 0.0, "and says nothing of the sonar by then"
 
@@ -238,11 +219,10 @@ def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(memor
     ids=["calm", "lag", "noise", "slow"],
 )
 def test_vehicles_doubt_where_something_is_not_as_expected(overrides, least, most):
-    scenario = with_policy_requirements("scout", load_scenario("random_field", num_vehicles=20, overrides=overrides))
-    swarm, policy, doubts = Swarm(scenario), make_policy("scout", scenario), []
-    percept, decisions = swarm.reset(10_007), round(40.0 / scenario.timing.decision_period_s)
+    (swarm, policy), doubts = piloted("scout", "random_field", overrides, seed=10_007, n=20), []
+    decisions = round(40.0 / swarm.scenario.timing.decision_period_s)
     for k in range(decisions):
-        percept = swarm.step(policy.act(percept))
+        fly(swarm, policy, 1)
         if k > decisions / 4:
             doubts.append([uncertainty(0, i, policy.memory) for i in range(20)])
     assert least <= np.mean(doubts) <= most

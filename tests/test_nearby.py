@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tests.oracle import sonar
-from uuv_marl import load_scenario
-from uuv_marl.sim.swarm import Swarm
+from tests.swarms import started
 
 PILES = {"task.kinds": ["piles"], "timing.fixed": False}
 HULL = 1.0
@@ -18,8 +17,7 @@ BEHIND = [{"name": name, "kind": "active", "mounting_deg": mounting, "aperture_d
 def among_piles(period_s, seed, **changes):
     """Coasting vehicles among hundreds of discs, a third of which move; some leave all that they remembered."""
     changes |= {"timing.decision_period_s": period_s}
-    swarm = Swarm(load_scenario("hard_water", num_vehicles=30, overrides=PILES | changes), 1)
-    swarm.reset(10_000 + seed)
+    swarm = started("hard_water", PILES | changes, seed=10_000 + seed, n=30)
     rng, num = np.random.default_rng(seed), swarm.world_map.num_obstacles[0]
     assert num > 200
     first = swarm.world_map.obstacles[0, rng.integers(num, size=30)]

@@ -3,9 +3,6 @@
 import functools
 import json
 import math
-import os
-import subprocess
-import sys
 from fractions import Fraction
 
 import numpy as np
@@ -17,16 +14,15 @@ from tests import contract
 from tests.conftest import COUPLED, LIFT, RUDDER
 from tests.golden import STARTER
 from tests.oracle import motion, sonar
+from tests.processes import python
+from tests.swarms import started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy
-from uuv_marl.sim.cells import ONE_CELL_UP_TO, fit, max_cells
-from uuv_marl.sim.swarm import Swarm
+from uuv_marl.sim.cells import ONE_CELL_UP_TO
 from uuv_marl.sim.trigonometry import cos_sin, rotated
-from uuv_marl.sim.workspace import Columns
 
 BASE = load_scenario("tracking")
 SIZES = (1, 2, 3, 54, ONE_CELL_UP_TO, ONE_CELL_UP_TO + 1, 300, 600)
-GRIDS = [n for n in SIZES if n > ONE_CELL_UP_TO]
 
 
 @pytest.mark.parametrize("overrides", [{}, contract.SEA])
@@ -54,15 +50,9 @@ for name in () if scenario.current.flows else ANYWHERE:
 print(json.dumps([bits, actions]))
 """
     (bits, actions), (slow_bits, slow_actions) = (
-        json.loads(
-            subprocess.run(
-                [sys.executable, "-W", "error", "-c", run, json.dumps(overrides)], check=True,
-                env={**os.environ, "NUMBA_DISABLE_JIT": disable},
-                capture_output=True, text=True,
-            ).stdout
-        )
+        json.loads(python(run, json.dumps(overrides), PYTHONWARNINGS="error", NUMBA_DISABLE_JIT=disable))
         for disable in "01"
-    )  # fmt: skip
+    )
     assert [name for name in bits if slow_bits[name] != bits[name]] == []
     np.testing.assert_allclose(slow_actions, actions, rtol=0, atol=1e-4)
 
@@ -88,9 +78,7 @@ CLOCKS = {
 
 @functools.cache
 def fleet(clock):
-    swarm = Swarm(load_scenario(BASE, num_vehicles=8, overrides=CLOCKS[clock]))
-    swarm.reset(0)
-    return swarm
+    return started(BASE, CLOCKS[clock], n=8)
 
 
 @pytest.mark.parametrize("clock", CLOCKS)
@@ -265,20 +253,10 @@ def far_away(rng, n):
     return uniform(rng, n) + np.array([1e7, -3e7, 0.0])
 
 
-def some_lost(rng, n):
-    return uniform(rng, n)
-
-
-def all_lost(rng, n):
-    return uniform(rng, n)
-
-
-def all_lost_but_one(rng, n):
-    return uniform(rng, n)
-
-
-LAYOUTS = (uniform, lattice, line, oblique_line, all_in_a_metre, coincident, two_clusters, outlier, range_edges,
-           rows_on_cell_edges, far_away, some_lost, all_lost, all_lost_but_one)  # fmt: skip
+LAYOUTS = {layout.__name__: layout for layout in (
+    uniform, lattice, line, oblique_line, all_in_a_metre, coincident, two_clusters, outlier, range_edges,
+    rows_on_cell_edges, far_away,
+)} | dict.fromkeys(("some_lost", "all_lost", "all_lost_but_one"), uniform)  # fmt: skip
 DISCS = ((40.0, 30.0, 25.0), (-80.0, 20.0, 10.0), (50.5, 50.5, 0.3), (150.0, -200.0, 60.0))
 
 
@@ -289,8 +267,7 @@ def world(suite, n):
     if SUITES[suite]:
         changes["sonar.arrays"] = SUITES[suite]
     discs = [{"centre_m": [5000.0 + 200.0 * k, 9000.0], "radius_m": disc[2]} for k, disc in enumerate(DISCS)]
-    swarm = Swarm(load_scenario(BASE, num_vehicles=n, overrides={**changes, "obstacles": discs}))
-    swarm.reset(0)
+    swarm = started(BASE, {**changes, "obstacles": discs}, n=n)
     swarm.world_map.obstacles[0] = DISCS
     return swarm
 
@@ -298,12 +275,12 @@ def world(suite, n):
 def fill(swarm, layout, seed):
     rng, n = np.random.default_rng(seed), swarm.num_vehicles
     state = swarm.state
-    state.eta[0] = layout(rng, n)
+    state.eta[0] = LAYOUTS[layout](rng, n)
     state.before[0] = state.eta[0, :, :2] + rng.normal(0, 1, (n, 2))
-    state.alive[0] = rng.random(n) < {some_lost: 0.7, all_lost: 0.0, all_lost_but_one: 0.0}.get(layout, 1.0)
-    if layout is all_lost_but_one:
+    state.alive[0] = rng.random(n) < {"some_lost": 0.7, "all_lost": 0.0, "all_lost_but_one": 0.0}.get(layout, 1.0)
+    if layout == "all_lost_but_one":
         state.alive[0, rng.integers(n)] = True
-    if layout is far_away:
+    if layout == "far_away":
         swarm.world_map.obstacles[0, :, :2] = np.array(DISCS)[:, :2] + [1e7, -3e7]
     else:
         swarm.world_map.obstacles[0] = DISCS
@@ -334,7 +311,7 @@ def check(swarm):
     assert facts.collisions[0] == sum(met) // 2 + sum(touched)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
+@pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("suite", SUITES)
 def test_neighbours_distances_and_collisions_are_those_of_the_oracle(suite, layout):
     for n in SIZES if suite == "as set" else (1, 2, 3, 54, 300) if suite == "hiding" else (3, 54, 300):
@@ -348,9 +325,7 @@ def test_a_bearing_on_an_edge_along_the_border_of_a_cell_is_detected():
     """Far from the listener, where rounding puts the sub-sector's edge into the next row or column of cells."""
     n, cell = 300, 16.25
     for mounting in np.arange(-166.0, -158.0) + 0.3:
-        arrays = {"sonar.arrays": [array("a", mounting, 60, 1, 500)]}
-        swarm = Swarm(load_scenario(BASE, num_vehicles=n, overrides=arrays))
-        swarm.reset(0)
+        swarm = started(BASE, {"sonar.arrays": [array("a", mounting, 60, 1, 500)]}, n=n)
         (lower,), (upper,), *_ = sonar.sectors(swarm.scenario.sonar.arrays)
         for k, distance in ((k, distance) for k in range(8) for distance in (6 * cell, 8 * cell)):
             edge, quarter = (lower, upper)[k // 4], k % 4
@@ -371,8 +346,7 @@ def test_bearings_within_rounding_of_an_edge_where_two_bins_of_direction_meet():
         share = bearing / 128.0
         lower = math.degrees(math.atan2(share, 1.0 - abs(share)))
         arrays = {"sonar.arrays": [array("a", lower - 10, 20, 2, 500), array("b", lower + 10, 20, 2, 500)]}
-        swarm = Swarm(load_scenario(BASE, num_vehicles=2, overrides=arrays))
-        swarm.reset(0)
+        swarm = started(BASE, arrays, n=2)
         edge = sonar.sectors(swarm.scenario.sonar.arrays)[1][1] * 64.0
         for nudge in np.ndindex(5, 5):
             swarm.state.eta[0] = 0.0
@@ -381,48 +355,12 @@ def test_bearings_within_rounding_of_an_edge_where_two_bins_of_direction_meet():
             check(swarm)
 
 
-def grid_of(eta, side=16.25):
-    now = Columns(*np.zeros((len(Columns._fields), len(eta))))
-    now.x[:], now.y[:] = eta[:, 0], eta[:, 1]
-    return fit(0, np.ones((1, len(eta)), bool), side, now)
-
-
-@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
-def test_large_swarms_have_a_grid_of_bounded_size_and_small_ones_one_cell(layout):
-    for n in GRIDS:
-        grid = grid_of(layout(np.random.default_rng(0), n))
-        assert 1 <= grid.rows * grid.columns <= max_cells(n)
-        if layout not in (all_in_a_metre,):
-            assert grid.rows * grid.columns > 1
-    for n in (1, ONE_CELL_UP_TO):
-        grid = grid_of(layout(np.random.default_rng(0), n))
-        assert (grid.rows, grid.columns) == (1, 1)
-
-
-@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.__name__)
-def test_one_more_lost_vehicle_requires_a_grid_and_changes_nothing(layout):
-    few, more = world("as set", ONE_CELL_UP_TO), world("as set", ONE_CELL_UP_TO + 1)
-    few.state.nu[0] = 0.0
-    fill(few, layout, 7)
-    for ours, theirs in zip(more.state[:4], few.state[:4], strict=True):
-        ours[0, :-1] = theirs[0]
-    more.state.alive[0, -1] = False
-    more.world_map.obstacles[0] = more.state.obstacles_before[0] = few.world_map.obstacles[0]
-    more.observe()
-    np.testing.assert_array_equal(more.detected_index[0, :-1], few.detected_index[0])
-    np.testing.assert_array_equal(more.percept.flat[0, :-1], few.percept.flat[0])
-    np.testing.assert_array_equal(more.facts.spacing[0, :-1], few.facts.spacing[0])
-    np.testing.assert_array_equal(more.facts.vehicle_collisions[0, :-1], few.facts.vehicle_collisions[0])
-    assert more.facts.max_spacing[0] == few.facts.max_spacing[0]
-
-
 def test_a_vehicle_at_rest_at_a_hull_s_radius_from_an_obstacle_never_collides():
     """Where two ways of computing a distance differ by an ulp, an old gap must not count as a new collision."""
     offset = np.random.default_rng(0).uniform(20, 40, (10000, 2))
     x, y = next((x, y) for x, y in offset if math.sqrt(x * x + y * y) < math.hypot(x, y))
     disc = {"centre_m": [9e3, 9e3], "radius_m": 1.0}
-    one = Swarm(load_scenario(BASE, num_vehicles=1, overrides={"obstacles": [disc]}))
-    one.reset(0)
+    one = started(BASE, {"obstacles": [disc]}, n=1)
     one.state.eta[0], one.state.nu[0], one.world_map.obstacles[0, 0] = 0.0, 0.0, (x, y, math.hypot(x, y) - 1.0)
     one.state.obstacles_before[...] = one.world_map.obstacles
     for _ in range(3):
@@ -431,15 +369,10 @@ def test_a_vehicle_at_rest_at_a_hull_s_radius_from_an_obstacle_never_collides():
 
 
 SHAPES = {
-    "single": lambda n: np.zeros((1, 2)),
-    "two": lambda n: np.array([[0.0, 0.0], [3.0, 4.0]]),
-    "identical": lambda n: np.full((n, 2), 7.3),
     "circle": lambda n: 200.0 * np.array([[math.cos(6.3 * k / n), math.sin(6.3 * k / n)] for k in range(n)]),
     "triangle": lambda n: np.array([[0.0, 0.0], [100.0, 0.0], [50.0, 50.0 * math.sqrt(3)]])[np.arange(n) % 3],
-    "line": lambda n: np.outer(np.arange(n), [3.0, 4.0]),
     "heavy end": lambda n: np.vstack([np.zeros((n - 2, 2)), [[300.0, 0.0], [280.0, 120.0]]]),
     "lens": lambda n: np.vstack([np.outer(np.linspace(-1, 1, n - 2), [99.0, 0.0]), [[0.0, 100.0], [0.0, -100.0]]]),
-    "random": lambda n: np.random.default_rng(n).normal(0, 100, (n, 2)),
 }  # fmt: skip
 
 
@@ -449,8 +382,8 @@ def test_the_largest_distance_is_found_whatever_the_shape(shape, n):
     for shift in (0.0, 1e6):
         points = SHAPES[shape](n) + shift
         swarm = world("as set", n)
-        swarm.state.eta[0, : len(points), :2] = swarm.state.before[0, : len(points)] = points
-        swarm.state.alive[0] = np.arange(n) < len(points)
+        swarm.state.eta[0, :, :2] = swarm.state.before[0] = points
+        swarm.state.alive[0] = True
         swarm.observe()
         check(swarm)
 
@@ -461,10 +394,10 @@ EPISODES = {
     "surfaces, all channels": (
         STARTER, {"overrides": {"sonar.channels": ["compass", "link"], "sonar.echo_reports": "surface"}}
     ),
-    "link alone": ("multi_obstacle", {"num_vehicles": 9, "overrides": {"sonar.channels": ["link"]}}),
-    "obstacles hide": ("multi_obstacle", {"num_vehicles": 12, "overrides": {"sonar.obstacles_hide_vehicles": True}}),
-    "overlapping arrays": ("single_obstacle", {"num_vehicles": 7, "overrides": {"sonar.arrays": OVERLAPPING}}),
-    "losses": ("random_field", {"num_vehicles": 6, "overrides": {"losses.times_s": [0.3, 1.25, 1.25]}}),
+    "link alone": ("multi_obstacle", {"n": 9, "overrides": {"sonar.channels": ["link"]}}),
+    "obstacles hide": ("multi_obstacle", {"n": 12, "overrides": {"sonar.obstacles_hide_vehicles": True}}),
+    "overlapping arrays": ("single_obstacle", {"n": 7, "overrides": {"sonar.arrays": OVERLAPPING}}),
+    "losses": ("random_field", {"n": 6, "overrides": {"losses.times_s": [0.3, 1.25, 1.25]}}),
 }  # fmt: skip
 
 
@@ -508,10 +441,8 @@ def check_percept(swarm):
 @pytest.mark.parametrize("name", EPISODES)
 def test_an_episode_s_facts_and_percepts_are_those_of_the_oracle(name):
     scenario, change = EPISODES[name]
-    scenario = load_scenario(scenario, **change)
-    swarm, actor, rng = Swarm(scenario), make_policy("bio_inspired", scenario), np.random.default_rng(0)
-    swarm.reset(1)
-    actor.reset(1)
+    swarm, rng = started(scenario, seed=1, **change), np.random.default_rng(0)
+    actor = make_policy("bio_inspired", swarm.scenario)
     happened = set()
     for k in range(40):
         if k == 15:

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from uuv_marl import load_scenario, parallel_env
+from tests.swarms import fly, piloted, started
+from uuv_marl import evaluate, load_scenario
 from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
-from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import ScenarioError
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.maps.kinds import KINDS
 
 FIRST = 10_000
@@ -19,28 +18,27 @@ def told(kinds=tuple(KINDS), vehicles=10, **changes):
     return with_policy_requirements("oracle", base)
 
 
-def flown(scenario, worlds, decisions):
-    """A swarm that the oracle has led for a while."""
-    swarm, policy = Swarm(scenario, worlds), make_policy("oracle", scenario, worlds)
-    percept = swarm.reset(FIRST)
-    for _ in range(decisions):
-        percept = swarm.step(policy.act(percept))
-    return swarm, percept
-
-
 @pytest.mark.parametrize(
-    ("kind", "vehicles"), [*((kind, 10) for kind in KINDS), ("gate", 54), ("forest", 54), ("harbour", 54)]
+    ("scenario", "vehicles", "kind"),
+    [
+        *(("hard_water", 10, kind) for kind in KINDS),
+        *(("hard_water", 54, kind) for kind in ("gate", "forest", "harbour")),
+        *((name, None, None) for name in ("two_swarms_easy", "two_swarms", "two_swarms_hard", "silent_targets_easy")),
+    ],
 )
-def test_the_oracle_passes_every_kind_of_map_and_touches_nothing(kind, vehicles):
-    runs = [*episodes(told([kind], vehicles), "oracle", range(FIRST, FIRST + 4))]
-    assert np.mean([run.metrics["task"]["success_share"] for run in runs]) >= 0.95
-    assert max(run.metrics["task"]["time_ratio"] for run in runs) < 2.0
+def test_the_oracle_succeeds_on_every_kind_of_map_without_a_collision(scenario, vehicles, kind):
+    kinds = {"task.kinds": [kind]} if kind else {}
+    runs = evaluate("oracle", scenario, range(FIRST, FIRST + 4), num_vehicles=vehicles, overrides=kinds)
+    share = "held_share" if scenario.startswith("silent_targets") else "success_share"
+    assert np.mean([run["task"][share] for run in runs]) >= 0.95
+    assert not kind or max(run["task"]["time_ratio"] for run in runs) < 2.0
 
 
 @pytest.mark.parametrize("decisions", [0, 40])
 def test_what_the_channel_tells_is_true(decisions):
     """By a second hand: the point ahead lies on free water, nearer along the way; walls by brute force."""
-    swarm, percept = flown(told(), 8, decisions)
+    swarm, policy = piloted("oracle", told(), worlds=8, seed=FIRST)
+    percept = fly(swarm, policy, decisions)
     task, state, hull = swarm.task, swarm.state, swarm.scenario.collision.hull_radius_m
     np.testing.assert_allclose(percept["path_length"][:, :, 0], task.path_lengths(), rtol=1e-6)
     for w in range(8):
@@ -65,15 +63,13 @@ def test_what_the_channel_tells_is_true(decisions):
 
 
 def test_without_the_channel_nothing_is_added_and_nothing_changes():
-    plain, swarm = (Swarm(load_scenario(told(), overrides={"sonar.channels": have}), 3) for have in ([], ["path"]))
+    plain, swarm = (started(told(), {"sonar.channels": have}, 3, FIRST) for have in ([], ["path"]))
     assert plain.task.memory.path_cost.size == 0
     assert plain.task_fields == ()
     assert swarm.layout.table[: len(plain.layout.table)] == plain.layout.table
     assert [field.name for field in swarm.task_fields] == ["path", "path_length", "path_walls"]
-    action = np.full((3, 10, 2), 0.5)
     for each in (plain, swarm):
-        each.reset(FIRST)
-        each.step(action)
+        each.step(np.full((3, 10, 2), 0.5))
     np.testing.assert_array_equal(swarm.percept.flat[:, :, : plain.layout.size], plain.percept.flat)
     with pytest.raises(KeyError, match="percept has no field 'path'"):
         plain.percept["path"]
@@ -84,24 +80,17 @@ def test_a_channel_that_the_task_lacks_is_refused_with_the_remedy():
         "sonar.channels can't hold 'path' with task 'follow', whose channels are compass, .*, modem; "
         "task 'hard_water' has it"
     )
-    with pytest.raises(ScenarioError, match=message):
-        load_scenario("starter", overrides={"sonar.channels": ["path"]})
-    with pytest.raises(ScenarioError, match=message):
-        with_policy_requirements("oracle", load_scenario("starter"))
+    for refused in (
+        lambda: load_scenario("starter", overrides={"sonar.channels": ["path"]}),
+        lambda: with_policy_requirements("oracle", load_scenario("starter")),
+    ):
+        with pytest.raises(ScenarioError, match=message):
+            refused()
     with pytest.raises(ScenarioError, match="can't hold 'wya' with task 'hard_water', whose channels are .*, path$"):
         load_scenario("hard_water", overrides={"sonar.channels": ["wya"]})
     for name in ("starter", "hard_water"):
         with pytest.raises(PolicyError, match="oracle needs the channels path and link"):
             make_policy("oracle", load_scenario(name))
-
-
-def test_the_oracle_works_by_observations_alone():
-    scenario = told()
-    env, swarm = parallel_env(scenario), Swarm(scenario)
-    observations, _ = env.reset(seed=FIRST)
-    actions = make_policy("oracle", env)(observations)
-    expected = make_policy("oracle", scenario).act(swarm.reset(FIRST))[0]
-    np.testing.assert_array_equal(np.stack(list(actions.values())), expected)
 
 
 def test_geodesic_progress_is_what_the_way_has_shortened_by():

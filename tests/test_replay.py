@@ -7,50 +7,38 @@ import shlex
 import subprocess
 import sys
 import types
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import uuv_marl.replay.encode
-from uuv_marl import load_scenario
-from uuv_marl.baselines import make_policy, with_policy_requirements
+from tests.processes import SETS, cli, quick
+from tests.swarms import piloted, run_of
 from uuv_marl.benchmark import runner
-from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
+from uuv_marl.replay import encode
 from uuv_marl.replay.encode import CODINGS, payload, unwrapped
 from uuv_marl.replay.record import record
-from uuv_marl.sim.swarm import Swarm
 
-QUICK = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0, "swarm.num_vehicles": 8}
-SETS = [f"--set={field}={value}" for field, value in QUICK.items()]
 ROUGH = {
     "start.spacing_m": 3.0, "start.length_m": 9.0, "start.width_m": 9.0, "collision.hull_radius_m": 1.4,
     "start.gap_m": 3.0,
     "obstacles": [{"centre_m": [157.0, 157.0], "radius_m": 3.0}], "time_limit.extra_s": 20.0,
 }  # fmt: skip
 """A crowd beside a rock: vehicles hit each other and it."""
-DECODER = Path(uuv_marl.replay.encode.__file__).parent / "decode.js"
-
-
-def quick(name="single_obstacle", **changes):
-    return load_scenario(name, overrides={**QUICK, **changes})
+DECODER = Path(encode.__file__).parent / "decode.js"
 
 
 def rough(**changes):
     return quick(**{**ROUGH, **changes})
 
 
-def run_of(scenario, policy, seed, watch=None):
-    events = episodes(with_policy_requirements(policy, scenario), policy, [seed], watch)
-    return next(event for event in events)
-
-
 def test_a_recording_is_the_benchmarks_run():
     scenario = quick("random_field")
-    run, recording = run_of(scenario, "sff", 3), record(scenario, "sff", 3)
+    run, recording = run_of("sff", scenario, seed=3), record(scenario, "sff", 3)
     assert recording.metrics == run.metrics
     np.testing.assert_array_equal(recording.time_s, run.series["time_s"])
     np.testing.assert_array_equal(recording.waypoints, run.waypoints)
@@ -67,23 +55,11 @@ def test_a_recording_is_the_benchmarks_run():
     np.testing.assert_allclose(recording.series["centre_error_m"], error, atol=1e-3)
 
 
-def test_watching_changes_nothing():
-    seen = []
-    watched = run_of(quick(), "bio_inspired", 2, lambda swarm, action: seen.append(action is None))
-    alone = run_of(quick(), "bio_inspired", 2)
-    assert watched.metrics == alone.metrics
-    for name, values in alone.series.items():
-        np.testing.assert_array_equal(watched.series[name], values)
-    assert seen == [True] + [False] * (len(alone.series["time_s"]) - 1)
-
-
 def test_inspected_vehicles_show_what_the_engine_recorded():
-    scenario = with_policy_requirements("bio_inspired", quick())
-    recording = record(scenario, "bio_inspired", 5, inspect=[6, 2, 6])
+    recording = record(quick(), "bio_inspired", 5, inspect=[6, 2, 6])
     assert list(recording.inspections) == [6, 2]
-    swarm, policy = Swarm(scenario), make_policy("bio_inspired", scenario)
-    percept = swarm.reset([5])
-    policy.reset([5])
+    swarm, policy = piloted("bio_inspired", quick(), seed=5)
+    percept = swarm.percept
     for t in range(30):
         action = policy.act(percept)
         for i, sonar in recording.inspections.items():
@@ -216,9 +192,7 @@ def written(monkeypatch):
     return calls
 
 
-def replay(*arguments):
-    done = CliRunner().invoke(app, ["replay", *map(str, arguments)])
-    return done.exit_code, " ".join(done.output.split())
+replay = partial(cli, "replay")
 
 
 def test_the_command_shows_policies_side_by_side(tmp_path, monkeypatch, written):
@@ -312,8 +286,7 @@ def test_the_benchmark_ends_with_the_command_that_shows_its_worst_seed(tmp_path,
     assert done.exit_code == 0, done.output
     (printed,) = re.findall(r"^ *uuv-marl (replay .*)$", done.output, flags=re.M)
     rows = [runner.ResultRow(**run) for run in json.loads(Path("out/results.json").read_text())["runs"]]
-    again = CliRunner().invoke(app, shlex.split(printed))
-    assert again.exit_code == 0, again.output
+    assert cli(*shlex.split(printed))[0] == 0
     ((recordings, _, _),) = written
     shown = recordings[0]
     (same,) = [r for r in rows if r[:3] == (shown.scenario.name, shown.policy, shown.seed)]

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.swarms import run_of
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.benchmark.evaluate import Run, episodes
 from uuv_marl.cli import app
 from uuv_marl.replay import demo
 from uuv_marl.replay.encode import CODINGS, payload
@@ -69,8 +68,7 @@ def read(page):
 @pytest.fixture(scope="module")
 def runs():
     """The benchmark's runs of the same episodes: what results.json holds."""
-    scenarios = {policy: with_policy_requirements(policy, load_scenario("lossy")) for policy in POLICIES}
-    return [next(r for r in episodes(scenarios[p], p, [SEED]) if isinstance(r, Run)) for p in POLICIES]
+    return [run_of(policy, "lossy", seed=SEED) for policy in POLICIES]
 
 
 @pytest.mark.parametrize("k", range(len(POLICIES)), ids=POLICIES)

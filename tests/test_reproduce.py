@@ -1,6 +1,5 @@
 """The reproduction: its figures come from its data, its ledger from its runs, and its sentences can fail."""
 
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -26,26 +25,6 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("reproduce")
     job.reproduce(folder, 1, [*FROM_RUNS, job.LEDGER], lambda what, share: None)
     return folder
-
-
-def test_scenario_files_differ_in_what_the_papers_text_says_and_nothing_else():
-    said = {
-        "tracking": {"trajectory": {"waypoints_m": [[180, 180], [800, 100], [500, 600], [1000, 1000]]}},
-        "single_obstacle": {
-            "trajectory": {"waypoints_m": [[150, 150], [600, 600]]},
-            "obstacles": [{"centre_m": [350, 350], "radius_m": 25}],
-        },
-        "multi_obstacle": {
-            "trajectory": {"waypoints_m": [[200, 200], [800, 100], [500, 600], [1000, 1000]]},
-            "obstacles": [
-                {"centre_m": list(centre), "radius_m": 25}
-                for centre in ((600, 100), (400, 200), (700, 850), (700, 700))
-            ],
-        },
-    }
-    for name, text in said.items():
-        file = tomllib.loads((ROOT / "uuv_marl" / "scenario" / f"{name}.toml").read_text())
-        assert {key: value for key, value in file.items() if key not in ("title", "source", "version")} == text
 
 
 def test_the_papers_inputs_are_the_scenarios():

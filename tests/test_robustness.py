@@ -5,14 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from tests.processes import cli
 from uuv_marl import load_scenario
 from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.robustness import job, page, scores
 from uuv_marl.benchmark.robustness.axes import AXES, BASE, CALM, GROUPS, overrides
 from uuv_marl.benchmark.success import GRACE_S
-from uuv_marl.cli import app
 from uuv_marl.scenario import disturbances
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -112,11 +111,8 @@ def test_a_cell_that_is_done_is_not_run_again(tmp_path, monkeypatch):
 
 
 def test_the_command_writes_results_page_and_picture(tmp_path):
-    args = (
-        "robustness --scenario starter --axis A1 --axis C1 --level 1 --level 5 --policy bio_inspired --seeds 1 --output"
-    )
-    result = CliRunner().invoke(app, [*args.split(), str(tmp_path)])
-    assert result.exit_code == 0, result.output
+    words = "--scenario starter --axis A1 --axis C1 --level 1 --level 5 --policy bio_inspired --seeds 1 --output"
+    assert cli("robustness", *words.split(), tmp_path)[0] == 0
     text = (tmp_path / "robustness.md").read_text()
     assert "| A1 | actuator lag |" in text
     assert "| C1 |" not in text, "it uses neither link nor modem"

@@ -1,4 +1,4 @@
-"""From a wished force to a rudder, and policies on vehicles other than the paper's."""
+"""From a desired force to a rudder, and policies on vehicles other than the paper's."""
 
 import math
 import re
@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+from tests.swarms import fly, piloted
 from uuv_marl import load_scenario
 from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.policy import Limits, Policy
@@ -13,7 +14,6 @@ from uuv_marl.baselines.requirements import inner_loop_nms
 from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
 from uuv_marl.baselines.steering import steer
 from uuv_marl.percept import Percept, PerceptLayout
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.train.training import overrides_for
 
 
@@ -31,7 +31,7 @@ def with_vehicle(vehicle, num_vehicles=1, speed=1.5):
 
 
 def helm(scenario, force, u):
-    """Thrust and rudder for a wished force, body frame, as shares of full thrust and torque."""
+    """Thrust and rudder for a desired force, body frame, as shares of full thrust and torque."""
     layout = PerceptLayout.of(scenario)
     flat = np.zeros((1, 1, layout.size), np.float32)
     Percept(flat, layout)["velocity"][..., 0] = u
@@ -44,12 +44,12 @@ LAUV = with_vehicle("lauv")
 
 
 @pytest.mark.parametrize("u", [0.75, 1.0, 1.5, 1.9])
-def test_a_rudder_gives_the_moment_that_is_wished(u):
+def test_a_rudder_gives_the_desired_moment(u):
     """Where it can: moment over N_uud u^2, from the plant's own numbers."""
-    actuators, wish = LAUV.actuators, 0.1
-    _, share = helm(LAUV, (0.5, wish), u)
+    actuators, desired = LAUV.actuators, 0.1
+    _, share = helm(LAUV, (0.5, desired), u)
     angle = share * math.radians(actuators.rudder_max_deg)
-    assert abs(actuators.N_uud) * u**2 * angle == pytest.approx(wish * actuators.max_torque_nm, rel=1e-5)
+    assert abs(actuators.N_uud) * u**2 * angle == pytest.approx(desired * actuators.max_torque_nm, rel=1e-5)
 
 
 def test_a_rudder_turns_the_bow_to_a_force_astern_and_keeps_steerage_way():
@@ -66,27 +66,22 @@ def test_a_rudder_turns_the_bow_to_a_force_astern_and_keeps_steerage_way():
     assert helm(with_vehicle("remus100"), (-0.7, 0.0), 1.5)[0] == pytest.approx(-0.7), "it has thrust astern"
 
 
-@pytest.mark.parametrize("wished", [(1.0, 0.0), (1.0, 0.4), (-1.0, 0.5), (0.2, -3.0)])
-def test_to_a_wished_velocity_a_rudder_turns_by_the_angle_whatever_the_hull_slips(wished):
-    limits, given = Limits.of(LAUV), []
-    for v in (-0.3, 0.0, 0.3):
-        out = np.zeros(2, np.float32)
-        steer(*wished, 1.0, v, 50.0, limits, out)
-        given.append(out.tolist())
-    assert given[0] == given[1] == given[2]
-    angle = math.atan2(wished[1], wished[0])
-    asked = math.sin(angle) / math.sin(math.radians(30.0))
-    assert given[0][1] == pytest.approx(np.clip(asked, -1.0, 1.0) if wished[0] > 0.0 else math.copysign(1.0, angle))
+@pytest.mark.parametrize("desired", [(1.0, 0.0), (1.0, 0.4), (-1.0, 0.5), (0.2, -3.0)])
+def test_to_a_desired_velocity_a_rudder_turns_by_the_angle_whatever_the_hull_slips(desired):
+    actions = np.zeros((3, 2), np.float32)
+    for v, out in zip((-0.3, 0.0, 0.3), actions, strict=True):
+        steer(*desired, 1.0, v, 50.0, Limits.of(LAUV), out)
+    assert (actions == actions[0]).all()
+    angle = math.atan2(desired[1], desired[0])
+    rudder = np.clip(math.sin(angle) / math.sin(math.radians(30.0)), -1.0, 1.0)
+    assert actions[0, 1] == pytest.approx(rudder if desired[0] > 0.0 else math.copysign(1.0, angle))
 
 
 @pytest.mark.parametrize("name", ["lauv", "remus100"])
 def test_torpedoes_pass_an_obstacle_without_a_collision(name):
-    scenario = with_policy_requirements("scout", with_vehicle(name, num_vehicles=12))
-    swarm, actor = Swarm(scenario), make_policy("scout", scenario)
-    percept, collisions = swarm.reset(10_000), 0
-    actor.reset(10_000)
+    (swarm, policy), collisions = piloted("scout", with_vehicle(name, num_vehicles=12), seed=10_000), 0
     while not swarm.ended[0]:
-        percept = swarm.step(actor.act(percept))
+        fly(swarm, policy, 1)
         collisions += int(swarm.facts.collisions[0])
     assert swarm.arrived[0]
     assert collisions == 0

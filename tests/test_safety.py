@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from uuv_marl import load_scenario
+from tests.swarms import piloted
+from uuv_marl import evaluate, load_scenario
 from uuv_marl.baselines import Policy, PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.barrier import Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
-from uuv_marl.benchmark.evaluate import episodes
-from uuv_marl.sim.swarm import Swarm
 
 
 class Ahead(Policy):
@@ -30,10 +29,7 @@ COURSE = {"trajectory.waypoints_m": [[0.0, 0.0], [900.0, 0.0]]}
 
 def placed(overrides, poses, name, **parameters):
     """A swarm with its vehicles at (x, y, heading), and a policy for it."""
-    scenario = load_scenario("single_obstacle", num_vehicles=len(poses), overrides=COURSE | overrides)
-    scenario = with_policy_requirements(name, scenario)
-    swarm, policy = Swarm(scenario), make_policy(name, scenario, **parameters)
-    swarm.reset(0)
+    swarm, policy = piloted(name, "single_obstacle", COURSE | overrides, n=len(poses), **parameters)
     swarm.state.eta[0], swarm.state.nu[0] = np.array(poses), 0.0
     return swarm, policy, swarm.observe()
 
@@ -105,9 +101,7 @@ def test_policies_that_collide_alone_do_not_inside_the_filter(name):
     """On a crowded field of the tuning seeds; more are in docs/policies.md."""
     collisions = {}
     for policy in (name, f"{name},safety_filter=true"):
-        scenario = with_policy_requirements(policy, load_scenario("random_field"))
-        runs = list(episodes(scenario, policy, [10_007]))
-        collisions[policy] = sum(run.metrics["collisions"] for run in runs)
+        collisions[policy] = evaluate(policy, "random_field", [10_007])[0]["collisions"]
     assert collisions[name] > 0
     assert collisions[f"{name},safety_filter=true"] == 0
 
@@ -118,10 +112,6 @@ def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
     assert policy.name == "bio_inspired,zeta_n=0.5,safety_filter=true"
     assert policy.parts["inner"].gains.zeta_n == 0.5
     assert policy.barrier.obstacle_m == 9.0
-    with pytest.raises(PolicyError, match="barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"):
-        make_policy("bio_inspired,barrier=5,safety_filter=true", scenario)
-    with pytest.raises(PolicyError, match="safety_filter must be true or false, got 'perhaps'"):
-        make_policy("bio_inspired,safety_filter=perhaps", scenario)
     guarded = make_policy("sff,safety_filter=true", with_policy_requirements("sff,safety_filter=true", scenario))
     with pytest.raises(PolicyError, match=r"the snapshot's identity must be"):
         guarded.restore(guarded.snapshot() | {"inner.identity": np.zeros(3)})
@@ -129,9 +119,5 @@ def test_the_filter_takes_margins_and_parameters_of_the_policy_inside():
 
 @pytest.mark.parametrize("echoes", ["centre", "surface"])
 def test_scout_arrives_and_touches_nothing(echoes):
-    scenario = with_policy_requirements(
-        "scout", load_scenario("random_field", overrides={"sonar.echo_reports": echoes})
-    )
-    runs = list(episodes(scenario, "scout", [10_007, 10_008]))
-    assert all(run.metrics["collisions"] == 0 for run in runs)
-    assert all(run.metrics["task_time_s"] is not None for run in runs)
+    runs = evaluate("scout", "random_field", [10_007, 10_008], overrides={"sonar.echo_reports": echoes})
+    assert all(run["collisions"] == 0 and run["task_time_s"] is not None for run in runs)

@@ -16,6 +16,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
+from tests.contract import ARRIVES
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
 from uuv_marl.envs.sb3 import SwarmVecEnv
@@ -23,7 +24,6 @@ from uuv_marl.train import run
 from uuv_marl.train.sb3 import save_sb3
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
-QUICK = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
 
 
 @pytest.fixture(autouse=True)
@@ -106,7 +106,7 @@ def test_episode_statistics_agree_with_vecmonitor():
 
 def test_time_limits_are_bootstrapped_and_arrivals_are_not(monkeypatch):
     """What SB3 puts into its buffer: at a time limit the value of ``terminal_observation`` is added, at arrival not."""
-    for overrides, scenario, truncated in ((SHORT, "random_field", True), (QUICK, "single_obstacle", False)):
+    for overrides, scenario, truncated in ((SHORT, "random_field", True), (ARRIVES, "single_obstacle", False)):
         env = swarm(scenario=scenario, overrides=overrides)
         model = PPO("MlpPolicy", env, n_steps=40, batch_size=64, n_epochs=1, seed=0, device="cpu")
         asked = []
@@ -171,20 +171,19 @@ class Doubled(FlattenExtractor):
 
 
 def test_a_model_that_makes_no_checkpoint_is_refused(tmp_path):
-    for env in (swarm(), VecNormalize(actors())):
-        with pytest.raises(PolicyError, match="train on SwarmVecEnv.*observe='closeness'"):
-            save_sb3(PPO("MlpPolicy", env, device="cpu"), tmp_path / "a")
-    relu = PPO("MlpPolicy", actors(), policy_kwargs={"activation_fn": torch.nn.ReLU}, device="cpu")
-    with pytest.raises(PolicyError, match="tanh layers, got .*leave activation_fn out"):
-        save_sb3(relu, tmp_path / "a")
-    for told in ({"squash_output": True}, {"features_extractor_class": Doubled}):
-        other = PPO("MlpPolicy", actors(), use_sde="squash_output" in told, policy_kwargs=told, device="cpu")
-        with pytest.raises(PolicyError, match="the actor alone; leave features_extractor_class and squash_output out"):
-            save_sb3(other, tmp_path / "a")
-    with pytest.raises(PolicyError, match=r"sees one observation of .*, got \(\d+,\); leave VecFrameStack out"):
-        save_sb3(PPO("MlpPolicy", VecFrameStack(actors(), 2), device="cpu"), tmp_path / "a")
-    with pytest.raises(PolicyError, match="a layer before its last"):
-        save_sb3(PPO("MlpPolicy", actors(), policy_kwargs={"net_arch": []}, device="cpu"), tmp_path / "a")
+    other_actor = "the actor alone; leave features_extractor_class and squash_output out"
+    for env, options, message in (
+        (swarm(), {}, "train on SwarmVecEnv.*observe='closeness'"),
+        (VecNormalize(actors()), {}, "train on SwarmVecEnv.*observe='closeness'"),
+        (VecFrameStack(actors(), 2), {}, r"sees one observation of .*, got \(\d+,\); leave VecFrameStack out"),
+        (actors(), {"activation_fn": torch.nn.ReLU}, "tanh layers, got .*leave activation_fn out"),
+        (actors(), {"squash_output": True}, other_actor),
+        (actors(), {"features_extractor_class": Doubled}, other_actor),
+        (actors(), {"net_arch": []}, "a layer before its last"),
+    ):
+        model = PPO("MlpPolicy", env, use_sde="squash_output" in options, policy_kwargs=options, device="cpu")
+        with pytest.raises(PolicyError, match=message):
+            save_sb3(model, tmp_path / "a")
 
 
 def test_the_example_trains_a_policy(tmp_path):

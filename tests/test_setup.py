@@ -1,7 +1,6 @@
 """It installs anywhere: what is missing on a machine is explained, and distributions hold what they should."""
 
 import email
-import importlib.util
 import re
 import subprocess
 import sys
@@ -14,6 +13,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.version import Version
 
+from tests.processes import module_of
+
 ROOT = Path(__file__).resolve().parent.parent
 MOST_BYTES = 2_200_000
 """Of a wheel: an installation stays a matter of seconds."""
@@ -22,10 +23,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 @pytest.fixture
 def setup():
-    spec = importlib.util.spec_from_file_location("setup_venv", ROOT / "tools" / "setup_venv.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return module_of(ROOT / "tools" / "setup_venv.py")
 
 
 @pytest.mark.parametrize("version", [(3, 10, 2), (3, 15, 0), (4, 0, 0)])

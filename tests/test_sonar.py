@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.swarms import started
 from uuv_marl import load_scenario
 from uuv_marl.sim.perception import echo
 from uuv_marl.sim.sonar import suite
-from uuv_marl.sim.swarm import Swarm
 
 seeds = st.integers(0, 2**32 - 1)
 BASE = load_scenario("tracking")
@@ -56,9 +56,7 @@ def test_an_echo_is_the_nearest_point_of_the_disc_within_the_beam(x, y, radius, 
 @settings(max_examples=25)
 @given(seeds, st.floats(-3, 3), st.floats(-300, 300), st.floats(-300, 300))
 def test_percepts_do_not_change_when_the_world_is_rotated_and_moved(seed, turn, x, y):
-    scenario = load_scenario("single_obstacle", num_vehicles=12, overrides={"sonar.channels": ["link"]})
-    swarm = Swarm(scenario)
-    swarm.reset(seed % 1000)
+    swarm = started("single_obstacle", {"sonar.channels": ["link"]}, seed=seed % 1000, n=12)
     swarm.state.nu[0] = np.random.default_rng(seed).uniform(-3, 3, (12, 3))
     before = swarm.observe().flat.copy()
     c, s = math.cos(turn), math.sin(turn)
@@ -73,8 +71,7 @@ def test_percepts_do_not_change_when_the_world_is_rotated_and_moved(seed, turn, 
 @settings(max_examples=20)
 @given(seeds)
 def test_permuting_vehicles_permutes_the_percepts(seed):
-    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=15))
-    swarm.reset(seed % 1000)
+    swarm = started("single_obstacle", seed=seed % 1000, n=15)
     before, heard = swarm.observe().flat[0].copy(), swarm.detected_index[0].copy()
     order = np.random.default_rng(seed).permutation(15)
     swarm.state.eta[0] = swarm.state.eta[0, order]
@@ -84,8 +81,9 @@ def test_permuting_vehicles_permutes_the_percepts(seed):
     np.testing.assert_array_equal(swarm.detected_index[0], rank[heard[order]])
 
 
-def test_the_reference_saturates_with_its_direction_kept(place):
-    swarm = place(BASE, [[-30000.0, -40000.0 + 180, 0]])
-    x, y = swarm.percept["reference"][0, 0]
+def test_the_reference_saturates_with_its_direction_kept():
+    swarm = started(BASE, n=1)
+    swarm.state.eta[0, 0] = -30000.0, -40000.0 + 180, 0.0
+    x, y = swarm.observe()["reference"][0, 0]
     assert math.hypot(x, y) == pytest.approx(4096.0, rel=1e-6)
     assert y / x == pytest.approx(40000.0 / 30180.0, rel=1e-5)

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uuv_marl import load_scenario
-from uuv_marl.sim.swarm import Swarm
+from tests.swarms import started
 from uuv_marl.sim.vehicle import Plant
 
 STOPS = {"collision.stops": True, "obstacles": [{"centre_m": [0.0, 0.0], "radius_m": 20.0}]}
@@ -16,11 +15,15 @@ NOTHING = np.zeros((1, 2, 2))
 
 def two(first, second, *, nu=((0.0, 0.0, 0.0),) * 2, **changes):
     """Two vehicles at these poses, the disc of 20 m around the origin."""
-    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=2, overrides={**STOPS, **changes}))
-    swarm.reset(0)
+    swarm = started("single_obstacle", {**STOPS, **changes}, n=2)
     swarm.state.eta[0], swarm.state.nu[0] = np.array([first, second]), np.array(nu)
     swarm.observe()
     return swarm
+
+
+def with_and_without(*start, **changes):
+    """The same vehicles where collisions stop them and where they do not."""
+    return (two(*start, **changes, **{"collision.stops": stops}) for stops in (True, False))
 
 
 def energy(swarm):
@@ -48,10 +51,8 @@ def test_a_hull_that_pushes_on_stays_at_the_wall_in_one_collision():
 
 def test_along_a_wall_a_hull_glides():
     """The impulse has no component along the surface: only drag changes that velocity."""
-    swarm = two((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    free = two(
-        (-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=((4.0, 0.0, 0.0), (0.0, 0.0, 0.0)), **{"collision.stops": False}
-    )
+    nu = (4.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    swarm, free = with_and_without((-8.0, -19.9, 0.1), (300.0, 0.0, 0.0), nu=nu)
     for _ in range(6):
         swarm.step(NOTHING)
         free.step(NOTHING)
@@ -76,9 +77,7 @@ def momentum(swarm):
 def test_energy_never_rises_and_two_hulls_keep_their_momentum(pose, first, second, x_g):
     """Against the same hulls without collisions: after a control step only the impulse differs."""
     start = (300.0 + pose[0], pose[1], pose[2]), (300.0, 0.0, 0.0)
-    on, off = (
-        two(*start, nu=(first, second), **{"vehicle.x_G_m": x_g, "collision.stops": stops}) for stops in (True, False)
-    )
+    on, off = with_and_without(*start, nu=(first, second), **{"vehicle.x_G_m": x_g})
     for swarm in (on, off):
         swarm.step(NOTHING)
     assert energy(on) <= energy(off) * (1.0 + 1e-9) + 1e-9
@@ -91,7 +90,7 @@ def test_hulls_of_other_masses_than_the_nominal_one_keep_their_momentum_too():
     """Masses are random (mismatch); against the same hulls without collisions, as above."""
     start, nu = ((300.0, 0.0, 0.0), (302.02, 0.0, 0.0)), ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     drawn = {"mismatch.mass": 0.8, "mismatch.added_mass": 0.8, "timing.integration_step_s": 0.00625}
-    on, off = (two(*start, nu=nu, **drawn, **{"collision.stops": stops}) for stops in (True, False))
+    on, off = with_and_without(*start, nu=nu, **drawn)
     mass = 1.0 / on._disturbances.hull.plants[0, :, Plant._fields.index("inverse_11")]
     assert mass.max() > 1.2 * mass.min()
     for swarm in (on, off):
@@ -112,18 +111,8 @@ def test_two_hulls_head_on_share_their_momentum():
     assert swarm.facts.vehicle_collisions[0].tolist() == [1, 1]
 
 
-def test_a_drifting_disc_carries_a_hull_along():
-    swarm = two((22.0, 0.0, 0.0), (300.0, 0.0, 0.0))
-    swarm.world_map.obstacle_velocity[0, 0] = (2.0, 0.0)
-    for _ in range(50):
-        swarm.step(NOTHING)
-        swarm.world_map.obstacle_velocity[0, 0] = (2.0, 0.0)
-    assert swarm.state.nu[0, 0, 0] == pytest.approx(2.0, abs=0.05)
-    assert swarm.facts.clearance[0, 0] >= 0.99
-
-
 def test_off_is_as_before():
-    on, off = (two((-30.0, 1.0, 0.0), (300.0, 0.0, 0.0), **{"collision.stops": stops}) for stops in (True, False))
+    on, off = with_and_without((-30.0, 1.0, 0.0), (300.0, 0.0, 0.0))
     for k in range(100):
         for swarm in (on, off):
             swarm.step(np.array([[[0.7, 0.0], [0.3, 0.1]]]))

@@ -1,15 +1,13 @@
-"""Success in disturbed water: who is safe, who is done, who counts; and episodes that arrival does not end."""
+"""Success with disturbances: safe, done and counted vehicles; and episodes that arrival does not end."""
 
 import numpy as np
 import pytest
 
 import uuv_marl
+from tests.swarms import run_of, started
 from uuv_marl import load_scenario
-from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
 from uuv_marl.envs.core import BatchedEnv
-from uuv_marl.sim.swarm import Swarm
 
 SPREAD_M = 80.0
 WORLD = np.ones(1, np.bool_)
@@ -19,13 +17,12 @@ class Story:
     """A hand-made episode: what each moment of it says is written, and nothing is simulated."""
 
     def __init__(self, n, **overrides):
-        self.swarm = Swarm(load_scenario("single_obstacle", num_vehicles=n, overrides=overrides))
-        self.swarm.reset(0)
+        self.swarm = started("single_obstacle", overrides, n=n)
         self.recorder = SuccessRecorder(self.swarm)
         self.recorder.update(WORLD)
 
     def moment(self, since_s, offsets, touching=(), lost=()):
-        """At ``since_s`` after l(t)'s end: where everybody is from there, who begins a contact, who is lost."""
+        """At ``since_s`` after l(t)'s end: offsets of all vehicles from it, new collisions, and losses."""
         swarm, facts, state = self.swarm, self.swarm.facts, self.swarm.state
         facts.time_s[0] = swarm.duration_s[0] + since_s
         state.tick[0] = round(facts.time_s[0] * 10)
@@ -55,17 +52,12 @@ def moved(n, vehicle, radius_m):
     return offsets
 
 
-def test_all_there_untouched_is_success():
-    assert Story(4).moment(GRACE_S, ring(4)).end == {
-        "success_share": 1.0,
-        "safe_share": 1.0,
-        "done_share": 1.0,
-        "swarm_success": 1,
-        "vehicles_faulty": 0,
-    }
+def test_all_at_their_goal_and_collision_free_is_success():
+    shares = dict.fromkeys(("success_share", "safe_share", "done_share"), 1.0)
+    assert Story(4).moment(GRACE_S, ring(4)).end == shares | {"swarm_success": 1, "vehicles_faulty": 0}
 
 
-def test_one_contact_at_any_time_makes_both_unsafe():
+def test_one_collision_at_any_time_makes_both_unsafe():
     for story in (
         Story(5).moment(-90.0, ring(5), touching=(1, 3)).moment(GRACE_S, ring(5)),
         Story(5).moment(GRACE_S, ring(5)).moment(GRACE_S + 1.0, ring(5), touching=(1, 3)),
@@ -102,7 +94,7 @@ def test_nothing_is_judged_before_its_time():
     assert end == {**dict.fromkeys(end), "vehicles_faulty": 0}
 
 
-def test_faulty_vehicles_count_in_nobodys_done_but_in_what_others_touch():
+def test_faulty_vehicles_count_only_in_the_collisions_of_others():
     broken = {"kind": "yaw", "share": 0.3, "onset_s": 5.0}
     story = Story(10, faults=[broken])
     faulty = np.flatnonzero(story.swarm._disturbances.hull.broken[0, :, 0, 0] == 50)
@@ -117,11 +109,8 @@ def test_faulty_vehicles_count_in_nobodys_done_but_in_what_others_touch():
 
 
 def test_a_fault_counts_from_the_hold_in_which_it_acts():
-    scenario = load_scenario(
-        "single_obstacle", overrides={"faults": [{"kind": "array", "array": "bow", "share": 0.1, "onset_s": 0.3}]}
-    )
-    swarm = Swarm(scenario)
-    swarm.reset(0)
+    fault = {"kind": "array", "array": "bow", "share": 0.1, "onset_s": 0.3}
+    swarm = started("single_obstacle", {"faults": [fault]})
     counts = []
     for _ in range(6):
         counts.append(int(swarm.faulty.sum()))
@@ -129,7 +118,7 @@ def test_a_fault_counts_from_the_hold_in_which_it_acts():
     assert counts == [0, 0, 0, 0, 6, 6]
 
 
-def test_lost_vehicles_count_unless_a_contact_lost_them():
+def test_lost_vehicles_are_excused_unless_a_collision_lost_them():
     end = Story(4).moment(10.0, ring(4), lost=(1,)).moment(GRACE_S, ring(4)).end
     assert (end["vehicles_faulty"], end["success_share"], end["swarm_success"]) == (1, 1.0, 1)
     end = Story(4).moment(10.0, ring(4), touching=(1,), lost=(1,)).moment(GRACE_S, ring(4)).end
@@ -145,13 +134,7 @@ LONG = {"arrival.ends_episode": False, "time_limit.factor": 1.0, "time_limit.ext
 
 def test_an_episode_that_arrival_does_not_end_goes_on_as_it_was():
     """The same run to arrival, with the same arrival, and then to the time limit."""
-    short, long = (
-        next(
-            event
-            for event in episodes(with_policy_requirements("bio_inspired_plus", scenario), "bio_inspired_plus", [3])
-        )
-        for scenario in (load_scenario("starter"), load_scenario("starter", overrides=LONG))
-    )
+    short, long = (run_of("bio_inspired_plus", "starter", changes, 3) for changes in ({}, LONG))
     assert long.metrics["task_time_s"] == short.metrics["task_time_s"]
     assert short.metrics["success_share"] is None
     assert long.metrics["success_share"] == 1.0
@@ -160,18 +143,18 @@ def test_an_episode_that_arrival_does_not_end_goes_on_as_it_was():
     assert long.series["time_s"][-1] == pytest.approx(long.metrics["duration_s"] + GRACE_S)
 
 
-def test_arrival_is_paid_once_and_the_last_info_tells_of_it():
+def test_arrival_is_rewarded_once_and_is_in_the_last_info():
     quick = {**LONG, "trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4}
     quick |= {"time_limit.extra_s": 6.0, "timing.decision_period_s": 0.5, "arrival.dwell_s": 0.7}
     batch = BatchedEnv(load_scenario("starter", overrides=quick))
     batch.reset(0)
-    paid, ended = [], []
-    while not ended or not ended[-1]:
+    rewards = []
+    while not batch.over.all():
         result = batch.step(np.zeros((1, 5, 2), np.float32))
-        paid.append(float(result.terms["arrival"][0, 0]))
-        ended.append(bool(result.world_truncated[0]))
+        rewards.append(float(result.terms["arrival"][0, 0]))
         assert not result.terminated.any()
-    assert np.count_nonzero(paid) == 1
+    assert result.world_truncated.all()
+    assert np.count_nonzero(rewards) == 1
     assert batch.swarm.arrived[0]
     env = uuv_marl.parallel_env("starter", overrides=quick)
     env.reset(seed=0)

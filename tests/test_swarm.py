@@ -1,11 +1,7 @@
 """Swarm: seeds, batches, endings, losses, collisions, and random fields."""
 
 import math
-import multiprocessing
-import os
 import pickle
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -13,22 +9,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import label
 
+from tests.processes import python
+from tests.swarms import fly, piloted, started
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.sim import engine as engine_module
 from uuv_marl.sim.field import sample_field
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.threads import on_threads
 
 
 def play(scenario, seeds, steps, policy="bio_inspired"):
     """Final states and percepts, world by world, of a few steps in one batch."""
-    scenario = with_policy_requirements(policy, scenario)
-    swarm, actor = Swarm(scenario, len(seeds)), make_policy(policy, scenario, len(seeds))
-    percept = swarm.reset(list(seeds))
+    swarm, actor = piloted(policy, scenario, worlds=len(seeds), seed=list(seeds))
     actor.reset(list(seeds))
-    for _ in range(steps):
-        percept = swarm.step(actor.act(percept))
+    percept = fly(swarm, actor, steps)
     return swarm.state.eta.copy(), swarm.state.nu.copy(), percept.flat.copy()
 
 
@@ -56,9 +49,7 @@ def test_threads_do_not_change_a_run(monkeypatch):
 @pytest.mark.parametrize("layer", ["omp", "workqueue"])
 def test_several_threads_step_batches_at_once(layer):
     """Numba's own threads would abort the process here, with its threading layer without OpenMP."""
-    environment = {**os.environ, "NUMBA_THREADING_LAYER": layer, "NUMBA_NUM_THREADS": "2"}
-    done = subprocess.run([sys.executable, "-c", AT_ONCE], capture_output=True, text=True, check=False, env=environment)
-    assert (done.returncode, done.stdout.strip()) == (0, "True"), done.stderr
+    assert python(AT_ONCE, NUMBA_THREADING_LAYER=layer, NUMBA_NUM_THREADS="2") == "True\n"
 
 
 AT_ONCE = """
@@ -92,14 +83,6 @@ def test_an_error_of_any_thread_is_raised_once_all_have_ended():
     assert not on_threads(lambda thread, begin, end: begin > 9, 10, 7)
 
 
-def test_another_process_gives_the_same_run():
-    scenario = load_scenario("single_obstacle")
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        theirs = pool.apply(play, (scenario, range(2), 50))
-    ours = play(scenario, range(2), 50)
-    assert all(a.tobytes() == b.tobytes() for a, b in zip(theirs, ours, strict=True))
-
-
 FORKED = """
 import os, numpy as np
 import uuv_marl
@@ -120,13 +103,11 @@ print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
 
 
 def test_after_a_fork_a_batch_runs_with_threads_of_its_own():
-    done = subprocess.run([sys.executable, "-c", FORKED], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "7", done.stderr
+    assert python(FORKED) == "7\n"
 
 
 def test_inactive_worlds_stay_unchanged():
-    swarm = Swarm(load_scenario("tracking", num_vehicles=4), 2)
-    swarm.reset(0)
+    swarm = started("tracking", worlds=2, n=4)
     before = swarm.state.eta.copy()
     swarm.step(np.ones((2, 4, 2), np.float32), np.array([True, False]))
     assert not np.array_equal(swarm.state.eta[0], before[0])
@@ -137,10 +118,8 @@ def test_inactive_worlds_stay_unchanged():
 @pytest.mark.parametrize(("n", "spacing"), [(1, 13.0), (2, 13.0), (5, 13.0), (54, 17.0), (55, 13.0), (200, 13.0)])
 def test_the_start_is_two_groups_behind_the_first_point_at_the_spacing(n, spacing):
     """At 17 m random placement finds no room, and the lattice is used."""
-    scenario = load_scenario("single_obstacle", num_vehicles=n, overrides={"start.spacing_m": spacing})
-    swarm = Swarm(scenario, 3)
-    swarm.reset(0)
-    length, width = scenario.start.sides(n)
+    swarm = started("single_obstacle", {"start.spacing_m": spacing}, worlds=3, n=n)
+    length, width = swarm.scenario.start.sides(n)
     for eta, nu in zip(swarm.state.eta, swarm.state.nu, strict=True):
         offset = eta[:, :2] - 150.0
         along, across = (offset[:, 0] + offset[:, 1]) / math.sqrt(2), (offset[:, 1] - offset[:, 0]) / math.sqrt(2)
@@ -156,45 +135,36 @@ def test_the_start_is_two_groups_behind_the_first_point_at_the_spacing(n, spacin
         assert swarm.facts.min_spacing.min() >= spacing
 
 
-def test_arrival_needs_rest_nearness_spread_and_dwell(place):
-    scenario = load_scenario("single_obstacle", num_vehicles=2)
-    swarm = Swarm(scenario)
-    swarm.reset(0)
-    idle = np.zeros((1, 2, 2), np.float32)
+NEAR = [[5.0, 0.0], [-1.1, 0.0]]  # the centre 1.95 m off
+FAR = [[9.0, 0.0], [-1.1, 0.0]]
 
-    def stay(offsets, seconds, ticks_from):
-        swarm.state.tick[0] = ticks_from
+
+def test_arrival_needs_rest_nearness_spread_and_dwell():
+    swarm, late = started("single_obstacle", n=2), 1700
+    for offsets, seconds, tick, arrives in (
+        ([[1.0, 0.0], [-1.0, 0.0]], 20.0, 1000, False),  # l(t) still on its way
+        ([[90.0, 0.0], [-90.0, 0.0]], 6.0, late, False),  # too wide
+        ([[5.0, 0.0], [-0.9, 0.0]], 6.0, late, False),  # the centre 2.05 m off
+        (NEAR, 4.0, late, False),
+        (FAR, 0.1, late + 40, False),  # interrupted
+        (NEAR, 4.0, late + 41, False),
+        (FAR, 0.1, late, False),
+        (NEAR, 5.0, late, False),  # not long enough
+        (NEAR, 0.1, late + 50, True),
+    ):
+        swarm.state.tick[0] = tick
         for _ in range(round(seconds * 10)):
             swarm.state.eta[0, :, :2] = 600.0 + np.array(offsets)
             swarm.state.nu[0] = 0.0
-            swarm.step(idle)
-
-    late = 1700
-    stay([[1.0, 0.0], [-1.0, 0.0]], 20.0, 1000)  # l(t) still on its way
-    assert not swarm.arrived[0]
-    stay([[90.0, 0.0], [-90.0, 0.0]], 6.0, late)  # too wide
-    assert not swarm.arrived[0]
-    stay([[5.0, 0.0], [-0.9, 0.0]], 6.0, late)  # centre 2.05 m off
-    assert not swarm.arrived[0]
-    stay([[5.0, 0.0], [-1.1, 0.0]], 4.0, late)  # interrupted
-    stay([[9.0, 0.0], [-1.1, 0.0]], 0.1, late + 40)
-    stay([[5.0, 0.0], [-1.1, 0.0]], 4.0, late + 41)
-    assert not swarm.arrived[0]
-    stay([[9.0, 0.0], [-1.1, 0.0]], 0.1, late)
-    stay([[5.0, 0.0], [-1.1, 0.0]], 5.0, late)  # not long enough
-    assert not swarm.arrived[0]
-    stay([[5.0, 0.0], [-1.1, 0.0]], 0.1, late + 50)
-    assert swarm.arrived[0]
+            swarm.step(np.zeros((1, 2, 2), np.float32))
+        assert swarm.arrived[0] == arrives
     assert swarm.facts.arrival_s[0, 0] == pytest.approx((late + 1) / 10)
     assert math.isnan(swarm.facts.arrival_s[0, 1])  # never within 1 m
     assert swarm.facts.arrival_s[0, 2] <= swarm.facts.arrival_s[0, 0]  # within 5 m
 
 
-def passing(**changes):
-    base = {"arrival.criterion": "passage", "trajectory.waypoints_m": [[0.0, 0.0], [100.0, 0.0], [100.0, 60.0]]}
-    return load_scenario("tracking", num_vehicles=4, overrides={**base, "arrival.spread_m": 10.0, **changes})
-
-
+PASSING = {"arrival.criterion": "passage", "trajectory.waypoints_m": [[0.0, 0.0], [100.0, 0.0], [100.0, 60.0]],
+           "arrival.spread_m": 10.0}  # fmt: skip
 SPREAD = np.array([[-3.0, -3.0], [3.0, -3.0], [-3.0, 3.0], [3.0, 3.0]])
 
 
@@ -212,8 +182,7 @@ SPREAD = np.array([[-3.0, -3.0], [3.0, -3.0], [-3.0, 3.0], [3.0, 3.0]])
 )
 def test_a_swarm_arrives_as_its_centre_crosses_the_line_through_the_end_together(centre, scattered, time_s, arrives):
     """And l(t) has: its path of 160 m takes 40 s."""
-    swarm = Swarm(passing())
-    swarm.reset(0)
+    swarm = started("tracking", PASSING, n=4)
     swarm.state.eta[0, :, :2], swarm.state.tick[:] = np.array(centre) + scattered * SPREAD, round(10.0 * time_s)
     swarm.observe()
     assert swarm.arrived[0] == arrives
@@ -221,9 +190,7 @@ def test_a_swarm_arrives_as_its_centre_crosses_the_line_through_the_end_together
 
 
 def test_lost_vehicles_are_not_detected_and_leave_the_centre():
-    scenario = load_scenario("lossy", overrides={"losses.times_s": [0.0, 0.25, 1.0]})
-    swarm = Swarm(scenario)
-    swarm.reset(5)
+    swarm = started("lossy", {"losses.times_s": [0.0, 0.25, 1.0]}, seed=5)
     action = np.zeros((1, 54, 2), np.float32)
     lost_at = {}
     for step in range(1, 13):
@@ -272,9 +239,7 @@ def test_random_fields_are_feasible(seed, n):
 
 def test_an_obstacle_that_moves_onto_a_vehicle_is_a_collision():
     """The motion of both counts; resting or moving within a collision begins no other."""
-    scenario = load_scenario("single_obstacle", num_vehicles=2)
-    swarm, still = Swarm(scenario), np.zeros((1, 2, 2), np.float32)
-    swarm.reset(0)
+    swarm, still = started("single_obstacle", n=2), np.zeros((1, 2, 2), np.float32)
     swarm.state.nu[...] = 0.0
     counted = []
     for north in (30.0, 25.5, 25.0, 500.0, 25.5):  # from the vehicle to the centre of a disc of 25 m [m]
@@ -290,15 +255,7 @@ def test_an_obstacle_that_moves_onto_a_vehicle_is_a_collision():
 
 
 def test_a_swarm_that_has_run_can_be_pickled_and_continues_alike():
-    swarm, action = Swarm(load_scenario("starter"), 2), np.full((2, 5, 2), 0.5, np.float32)
-    swarm.reset(0)
+    swarm, action = started("starter", worlds=2), np.full((2, 5, 2), 0.5, np.float32)
     swarm.step(action)
     copy = pickle.loads(pickle.dumps(swarm))
     assert copy.step(action).flat.tobytes() == swarm.step(action).flat.tobytes()
-
-
-@pytest.mark.parametrize(("threads", "head"), [(1, 0), (3, 0), (3, 2), (7, 2), (3, 40), (12, 0)])
-def test_threads_do_all_of_the_work_once(threads, head):
-    done = []
-    assert on_threads(lambda thread, begin, end: done.extend(range(begin, end)) or end == 10, 10, threads, head)
-    assert sorted(done) == list(range(10))

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
+from tests.swarms import piloted
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.bug.walls import SAME_M
-from uuv_marl.sim.swarm import Swarm
 
 GOAL_M = 200.0
 BAR = [(110.0, float(y)) for y in range(-70, 41, 10)]
@@ -26,16 +25,13 @@ def water(walls, surface=False, side=1.0):
     return load_scenario("starter", num_vehicles=1, overrides=changes)
 
 
-def fly(name, scenario, side=1.0, steps=300, **parameters):
+def goes(name, scenario, side=1.0, steps=300, **parameters):
     """The swarm, the policy, and places [m], shape (decision, 2), until the vehicle is there."""
-    scenario = with_policy_requirements(name, scenario)
-    swarm, policy = Swarm(scenario), make_policy(name, scenario, **parameters)
-    swarm.reset(10_000)
+    (swarm, policy), places = piloted(name, scenario, seed=10_000, **parameters), []
     swarm.state.eta[0, 0], swarm.state.nu[0, 0] = (5.0, 4.0 * side, 0.0), 0.0
-    policy.reset(0)
-    percept, places = swarm.observe(), []
+    swarm.observe()
     for _ in range(steps):
-        percept = swarm.step(policy.act(percept))
+        swarm.step(policy.act(swarm.percept))
         places.append(swarm.state.eta[0, 0, :2].copy())
         if swarm.ended[0]:
             break
@@ -45,16 +41,16 @@ def fly(name, scenario, side=1.0, steps=300, **parameters):
 @pytest.mark.parametrize("walls", [BAR, POCKET], ids=["bar", "pocket"])
 @pytest.mark.parametrize("surface", [False, True], ids=["centres", "surfaces"])
 def test_it_comes_round_a_wall_that_stops_a_pull(walls, surface):
-    swarm, _, places = fly("tangent_bug", water(walls, surface))
+    swarm, _, places = goes("tangent_bug", water(walls, surface))
     assert np.hypot(GOAL_M - places[-1, 0], places[-1, 1]) <= 10.0
     assert not swarm.state.collided.any()
-    _, _, pulled = fly("proportional_tracking,safety_filter=true", water(walls, surface))
+    _, _, pulled = goes("proportional_tracking,safety_filter=true", water(walls, surface))
     assert pulled[-1, 0] < 110.0
 
 
 def test_in_mirrored_water_it_goes_the_mirrored_way():
-    _, _, places = fly("tangent_bug", water(BAR))
-    _, _, mirrored = fly("tangent_bug", water(BAR, side=-1.0), side=-1.0)
+    _, _, places = goes("tangent_bug", water(BAR))
+    _, _, mirrored = goes("tangent_bug", water(BAR, side=-1.0), side=-1.0)
     assert np.abs(places[:, 1]).max() > 45.0
     np.testing.assert_allclose(places[:, 1], -mirrored[:, 1], atol=0.01)
 
@@ -62,7 +58,7 @@ def test_in_mirrored_water_it_goes_the_mirrored_way():
 @pytest.mark.parametrize("surface", [False, True], ids=["centres", "surfaces"])
 def test_dead_reckoning_remembers_walls_where_they_are(surface):
     """After a way round them; the map's origin is the goal, and its first axis the bow at the start."""
-    swarm, policy, places = fly("tangent_bug", water(POCKET, surface), gains=BugGains(), barrier=BUG_BARRIER)
+    swarm, policy, places = goes("tangent_bug", water(POCKET, surface), gains=BugGains(), barrier=BUG_BARRIER)
     walls = policy.memory.echoes[0, 0, : int(policy.memory.num[0, 0])] + (GOAL_M, 0.0, 0.0)
     away = np.hypot(*(walls[:, None, :2] - swarm.world_map.obstacles[0, None, :, :2]).transpose(2, 0, 1))
     if surface:
@@ -77,7 +73,7 @@ def test_dead_reckoning_remembers_walls_where_they_are(surface):
 
 
 def test_more_walls_than_it_has_room_for_take_the_place_of_the_oldest():
-    swarm, policy, _ = fly("tangent_bug", water(BAR, True), steps=20)
+    swarm, policy, _ = goes("tangent_bug", water(BAR, True), steps=20)
     echoes, num, following = policy.memory.echoes, policy.memory.num, policy.memory.next
     room = echoes.shape[2]
     num[...], following[...], echoes[...] = room, room - 1, -5000.0
@@ -86,18 +82,3 @@ def test_more_walls_than_it_has_room_for_take_the_place_of_the_oldest():
     assert num[0, 0] == room
     assert set(heard) == {room - 1, *range(len(heard) - 1)}
     assert following[0, 0] == len(heard) - 1 > 1
-
-
-def test_it_decides_the_same_twice_and_forgets_at_a_reset():
-    scenario = water(POCKET)
-    swarm, policy, places = fly("tangent_bug", scenario, steps=60)
-    before = policy.snapshot()
-    np.testing.assert_array_equal(policy.act(swarm.percept), policy.act(swarm.percept))
-    assert policy.memory.num[0, 0] > 5
-    assert policy.memory.side[0, 0] != 0.0
-    policy.reset(0)
-    assert not any(array.any() for array in policy.memory)
-    policy.restore(before)
-    assert policy.memory.num[0, 0] > 5
-    _, _, again = fly("tangent_bug", scenario, steps=60)
-    np.testing.assert_array_equal(places, again)

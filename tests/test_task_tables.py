@@ -9,10 +9,9 @@ from research.blind import Blind
 from research.episodes import read_rows
 from research.tasks.page import report
 from research.tasks.studies import STUDIES, set_name
+from tests.swarms import fly, piloted
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.percept import Percept
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.maps.kinds import KINDS
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -51,13 +50,9 @@ def test_the_page_by_hand():
 
 
 def test_a_blind_policy_hears_no_echo_and_all_else():
-    scenario = with_policy_requirements("mappo", load_scenario("hard_water", num_vehicles=4))
-    swarm, blind, sighted = Swarm(scenario, 2), Blind(scenario, 2, inner="mappo"), make_policy("mappo", scenario, 2)
-    percept = swarm.reset(10_100)
-    for policy in (blind, sighted):
-        policy.reset(10_100)
-    for _ in range(60):
-        percept = swarm.step(sighted.act(percept))
+    swarm, sighted = piloted("mappo", "hard_water", worlds=2, seed=10_100, n=4)
+    blind = Blind(swarm.scenario, 2, inner="mappo")
+    percept = fly(swarm, sighted, 60)
     assert percept["echo"].any()
     unheard = Percept(percept.flat.copy(), percept.layout)
     for name in ("echo", "echo_range", "echo_position"):

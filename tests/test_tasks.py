@@ -1,28 +1,25 @@
 """The room for tasks: what the water does for them, what is refused, and a user's task through the tools."""
 
 import json
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import uuv_marl
+from tests.processes import cli, python
+from tests.swarms import run_of, started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.figures import _outcome
 from uuv_marl.benchmark.frame import load
-from uuv_marl.cli import app
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import RewardError, ScenarioError
 from uuv_marl.percept import FLAG, PerceptField
 from uuv_marl.sim.episode_setup import default_setup
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks import Follow, Task
 from uuv_marl.tasks.measures import MEASURED
 
@@ -41,15 +38,27 @@ for name in ("few_informed", "hard_water", "two_swarms", "silent_targets", "rand
 def test_draws_do_not_depend_on_the_processor_s_own_instructions():
     """Matrix products, and NumPy's functions, are other code on processors without them."""
     older = {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
-    now, before = (
-        subprocess.run(
-            [sys.executable, "-W", "ignore", "-c", DRAWS], env={**os.environ, **more}, capture_output=True, text=True,
-            check=True,
-        ).stdout
-        for more in ({}, older)
-    )  # fmt: skip
+    now, before = (python(DRAWS, PYTHONWARNINGS="ignore", **more) for more in ({}, older))
     assert len(now.splitlines()) == 5
     assert now == before
+
+
+@pytest.mark.parametrize("scenario", ["few_informed", "hard_water", "silent_targets", "two_swarms"])
+def test_a_map_depends_on_its_seed_alone(scenario):
+    """It is the same in a batch, whatever the vehicles do."""
+    batch, single, rng = started(scenario, worlds=5, seed=40), started(scenario), np.random.default_rng(0)
+    first, action = batch.snapshot(), np.zeros((5, batch.num_vehicles, 2))
+    for _ in range(60):
+        batch.step(action)
+    for w in (0, 2, 4):
+        single.reset(40 + w)
+        for name, array in single.snapshot().items():
+            if name != "streams":
+                np.testing.assert_array_equal(array[0], first[name][w], err_msg=name)
+        for _ in range(60):
+            single.step(0.3 * rng.uniform(-1.0, 1.0, action[:1].shape))
+        np.testing.assert_array_equal(single.world_map.obstacles[0], batch.world_map.obstacles[w])
+    assert len({places.tobytes() for places in first["eta"]}) == 5
 
 
 def test_a_goal_at_rest_is_at_rest_where_others_pass_by():
@@ -77,7 +86,7 @@ class Survive(Task):
 
 
 class TwoWays(Survive):
-    """Two groups, the second led by the mirror image of l(t); a vehicle of each knows nothing; an obstacle drifts."""
+    """Two groups, the second led by the mirror image of l(t); one vehicle of each is uninformed."""
 
     @classmethod
     def sizes(cls, scenario):
@@ -92,9 +101,6 @@ class TwoWays(Survive):
             group=(np.arange(n) % 2).astype(np.int64),
             informed=np.arange(n) > 1,
         )
-
-    def move(self, running):
-        self.swarm.world_map.obstacle_velocity[running, 0] = (0.0, 2.0)
 
 
 class Endless(Survive):
@@ -119,8 +125,7 @@ TWO = {"task": f"{__name__}:TwoWays"}
 
 @pytest.mark.parametrize("sea", [{}, {"navigation.drift_share": 0.1, "navigation.compass_bias_deg": 5.0}])
 def test_each_vehicle_perceives_its_own_groups_reference_or_nothing(sea):
-    swarm = Swarm(load_scenario("multi_obstacle", num_vehicles=6, overrides=TWO | sea), 2)
-    percept = swarm.reset(0)
+    swarm = started("multi_obstacle", TWO | sea, worlds=2, n=6)
     for _ in range(30):
         percept = swarm.step(np.zeros((2, 6, 2)))
     offset = swarm.own_reference[:, :, :2] - swarm.state.eta[:, :, :2]
@@ -133,28 +138,9 @@ def test_each_vehicle_perceives_its_own_groups_reference_or_nothing(sea):
     assert (percept["reference_velocity"][:, 2:] != 0).any(axis=-1).all()
 
 
-def test_an_obstacle_that_drifts_is_where_it_should_be_and_hits_who_lies_in_its_way():
-    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=4, overrides=TWO))
-    swarm.reset(0)
-    before = swarm.world_map.obstacles.copy()
-    radius = before[0, 0, 2]
-    swarm.state.eta[0, 0, :2] = before[0, 0, :2] + (0.0, radius + 3.0)  # 2 m from contact, in its way
-    swarm.state.nu[0, 0] = 0.0
-    swarm.observe()
-    contacts = []
-    for _ in range(20):
-        swarm.step(np.zeros((1, 4, 2)))
-        contacts.append(int(swarm.facts.vehicle_collisions[0, 0]))
-    np.testing.assert_allclose(swarm.world_map.obstacles[0, 0, :2], before[0, 0, :2] + (0.0, 4.0), atol=1e-9)
-    assert sum(contacts) == 1
-    assert swarm.state.collided[0].tolist() == [True, False, False, False]
-    assert contacts.index(1) in (9, 10)  # after about 1 s
-
-
 def test_an_arrival_of_groups_is_that_of_all():
     changes = TWO | {"arrival.radius_m": 1e5, "arrival.spread_m": 1e5, "arrival.dwell_s": 0.1}
-    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=4, overrides=changes))
-    swarm.reset(0)
+    swarm = started("single_obstacle", changes, n=4)
     swarm.world_map.times[0, 1] *= 0.001
     swarm.step(np.zeros((1, 4, 2)))
     swarm.step(np.zeros((1, 4, 2)))
@@ -163,18 +149,6 @@ def test_an_arrival_of_groups_is_that_of_all():
     swarm.step(np.zeros((1, 4, 2)))
     swarm.step(np.zeros((1, 4, 2)))
     assert swarm.arrived[0]
-
-
-def test_a_snapshot_of_groups_goes_on_bit_for_bit_and_refuses_a_group_that_is_not_there():
-    swarm = Swarm(load_scenario("multi_obstacle", num_vehicles=6, overrides=TWO))
-    swarm.reset(3)
-    snapshot = swarm.snapshot()
-    after = [swarm.step(np.full((1, 6, 2), 0.4)).flat.copy() for _ in range(5)]
-    swarm.restore(snapshot)
-    assert all((swarm.step(np.full((1, 6, 2), 0.4)).flat == flat).all() for flat in after)
-    snapshot["group"][0, 0] = 7
-    with pytest.raises(ValueError, match="group must lie within 0 and 1"):
-        swarm.restore(snapshot)
 
 
 def test_at_a_goal_at_rest_who_touched_something_has_failed():
@@ -293,8 +267,7 @@ def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():
         assert (mine.timing.decision_period_s, mine.actuators.yaw_damping_nms) == (0.5, 600.0)
     own = with_policy_requirements("bio_inspired,own_clock=true", scenario)
     assert (own.timing.decision_period_s, own.actuators.yaw_damping_nms) == (0.1, 0.0)
-    (run,) = episodes(own, "bio_inspired,own_clock=true", [0])
-    assert run.metrics["task_time_s"] is not None
+    assert run_of("bio_inspired,own_clock=true", scenario).metrics["task_time_s"] is not None
 
 
 @pytest.fixture
@@ -307,8 +280,7 @@ def in_example_folder(monkeypatch):
 
 def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path, in_example_folder):
     how = ["--scenario", "starter", "--set", "task=task:Rendezvous", "--policy", "random"]
-    done = CliRunner().invoke(app, ["benchmark", *how, "--seeds", "2", "--output", str(tmp_path / "out")])
-    assert done.exit_code == 0, done.output
+    assert cli("benchmark", *how, "--seeds", 2, "--output", tmp_path / "out")[0] == 0
     runs = json.loads((tmp_path / "out" / "results.json").read_text())["runs"]
     assert all(set(run["metrics"]["task"]) == {"success_share", "swarm_success", "spread_m"} for run in runs)
     text = (tmp_path / "out" / "table.md").read_text()
@@ -318,41 +290,8 @@ def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path,
     np.testing.assert_array_equal(frame["spread_m"], [run["metrics"]["task"]["spread_m"] for run in runs])
     assert {*frame.columns} <= {"spread_m", "success_share", "swarm_success", *MEASURED}
     assert _outcome(runs[0]["metrics"]).startswith("success 0%, ")
-    done = CliRunner().invoke(app, ["replay", *how, "--output", str(tmp_path / "replay.html")])
-    assert done.exit_code == 0, done.output
+    assert cli("replay", *how, "--output", tmp_path / "replay.html")[0] == 0
     assert (tmp_path / "replay.html").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize("library", ["gymnasium", "stable_baselines3", "torchrl"])
-def test_a_users_task_runs_in_other_libraries(library):
-    pytest.importorskip(library)
-    apart = {"name": EXAMPLE, "near_m": 0.5}  # never all there
-    how = {"scenario": "starter", "num_vehicles": 4, "task": apart, "overrides": {"time_limit.factor": 0.1}}
-    if library == "gymnasium":
-        import gymnasium
-
-        env, over = gymnasium.make("uuv_marl/Solo-v1", **how), False
-        seen, _ = env.reset(seed=0)
-        while not over:
-            assert env.observation_space.contains(seen)
-            seen, reward, terminated, over, info = env.step(env.action_space.sample())
-            assert reward < 0.0
-            assert not terminated
-        assert (info["is_success"], info["ending"]) == (False, "time_limit")
-    elif library == "stable_baselines3":
-        from stable_baselines3 import PPO
-
-        from uuv_marl.envs.sb3 import SwarmVecEnv
-
-        env = SwarmVecEnv(num_worlds=2, **how)
-        assert PPO("MlpPolicy", env, n_steps=32, batch_size=64, seed=0, device="cpu").learn(500).num_timesteps == 512
-    else:
-        from uuv_marl.envs.torchrl import SwarmEnv
-
-        data = SwarmEnv(2, **how, seed=0).rollout(200)
-        assert (data["next", "uuv", "reward"] < 0.0).all()
-        assert data["next", "truncated"][:, -1].all()
-        assert not data["next", "terminated"].any()
 
 
 @pytest.mark.needs("torch")
@@ -373,7 +312,5 @@ def test_a_users_task_is_trained_and_the_policy_runs(tmp_path):
     rewards = [record.reward for record in train(tmp_path / "a", training)]
     assert len(rewards) == 13
     assert np.isfinite(rewards).all()
-    policy = str(tmp_path / "a" / "best")
-    scenario = with_policy_requirements(policy, load_scenario("starter", overrides={"task": EXAMPLE}))
-    (run,) = episodes(scenario, policy, [0])
-    assert run.metrics["task"]["spread_m"] > 0.0
+    (run,) = uuv_marl.evaluate(str(tmp_path / "a" / "best"), "starter", [0], overrides={"task": EXAMPLE})
+    assert run["task"]["spread_m"] > 0.0

@@ -73,10 +73,9 @@ def test_a_seed_waits_for_each_worlds_next_reset():
 
 
 def test_the_arrival_is_paid_once_however_often_an_ended_world_is_stepped():
-    quick = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
     returns = []
     for skip in (1, 4):
-        env = TransformedEnv(swarm(1, "single_obstacle", quick, seed=0), FrameSkipTransform(skip))
+        env = TransformedEnv(swarm(1, "single_obstacle", contract.ARRIVES, seed=0), FrameSkipTransform(skip))
         idle = TensorDictModule(lambda o: torch.zeros(*o.shape[:-1], 2), [("uuv", "observation")], [("uuv", "action")])
         data = env.rollout(40, idle)
         assert data["next", "terminated"][0, -1]

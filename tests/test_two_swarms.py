@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
+from tests.swarms import piloted, started
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import BatchedEnv
-from uuv_marl.errors import ScenarioError
-from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.maps.grid_paths import MapGrid, free_cells
 
 TIERS = ("two_swarms_easy", "two_swarms", "two_swarms_hard")
@@ -16,7 +14,7 @@ TUNING = 10_000
 
 
 def waters(worlds=1, scenario="two_swarms", **changes):
-    return Swarm(load_scenario(scenario, overrides=changes), worlds)
+    return started(scenario, changes, worlds, TUNING)
 
 
 def framed(swarm, w):
@@ -33,7 +31,6 @@ def framed(swarm, w):
 @pytest.mark.parametrize("tier", TIERS)
 def test_groups_swap_sides(tier):
     swarm = waters(4, tier)
-    swarm.reset(TUNING)
     n = swarm.num_vehicles
     for w in range(4):
         place, goal, _ = framed(swarm, w)
@@ -51,7 +48,6 @@ def test_groups_swap_sides(tier):
 def test_the_gap_is_the_only_way_and_as_wide_as_its_numbers(tier):
     """By SciPy's labels: the two sides meet through the gap, and no more once the gap is shut."""
     swarm = waters(6, tier)
-    swarm.reset(TUNING)
     grid, hull = MapGrid(-260.0, -160.0, 208, 128), swarm.scenario.collision.hull_radius_m
     for w in range(6):
         place, goal, middles = framed(swarm, w)
@@ -72,26 +68,9 @@ def test_the_gap_is_the_only_way_and_as_wide_as_its_numbers(tier):
             assert parts[0, 0] != here[0]  # the banks keep them in
 
 
-def test_a_map_depends_on_its_seed_alone():
-    batch = waters(5)
-    batch.reset(TUNING)
-    for w in (0, 2, 4):
-        alone = waters()
-        alone.reset(TUNING + w)
-        for mine, theirs in zip(
-            (alone.world_map, alone.state, alone.task.memory),
-            (batch.world_map, batch.state, batch.task.memory),
-            strict=True,
-        ):
-            for name, array in mine._asdict().items():
-                np.testing.assert_array_equal(array[0], theirs._asdict()[name][w], err_msg=name)
-    assert len({float(gap) for gap in batch.task.memory.gap}) == 5
-
-
 def test_percepts_turn_with_a_map():
     """What is told of the way, too."""
     swarm = waters(**{"sonar.channels": ["path"]})
-    swarm.reset(TUNING)
     rng = np.random.default_rng(0)
     swarm.state.eta[0, :, :2] *= rng.uniform(0.3, 1.0, (40, 1))
     before, angle = swarm.observe().flat.copy(), 0.7
@@ -106,7 +85,7 @@ def test_percepts_turn_with_a_map():
 
 def test_each_vehicles_reference_is_its_own_goal():
     swarm = waters(2)
-    percept = swarm.reset(TUNING)
+    percept = swarm.percept
     goals = swarm.world_map.waypoints[:, :, 1]
     np.testing.assert_array_equal(swarm.own_reference[:, :, :2], goals)
     np.testing.assert_allclose(
@@ -143,7 +122,6 @@ def test_success_is_untouched_and_there_and_the_episode_ends_when_all_are_there(
 
 def test_the_straight_way_is_that_through_the_gaps_middle():
     swarm = waters(3)
-    swarm.reset(TUNING)
     for w in range(3):
         place, goal, _ = framed(swarm, w)
         gap = np.array([0.0, swarm.task.memory.gap[w]])
@@ -154,7 +132,7 @@ def test_the_straight_way_is_that_through_the_gaps_middle():
 
 def test_one_group_has_its_turn_once_the_other_is_through():
     swarm = waters(**{"sonar.channels": ["path"]})
-    percept = swarm.reset(TUNING)
+    percept = swarm.percept
     first = swarm.task.memory.side[0] > 0.0
     assert (percept["right_of_way"][0, :, 0] == first).all()
     swarm.state.eta[0, first, :2] = swarm.world_map.waypoints[0, first, 1]
@@ -164,17 +142,6 @@ def test_one_group_has_its_turn_once_the_other_is_through():
     swarm.state.collided[0, last] = True  # it has failed: nobody waits for it
     swarm._write_task_fields(np.ones(1, np.bool_))
     assert (percept["right_of_way"] == 1.0).all()
-
-
-@pytest.mark.parametrize("tier", TIERS)
-def test_the_oracle_passes(tier):
-    scenario = with_policy_requirements("oracle", load_scenario(tier))
-    batch, policy = BatchedEnv(scenario, 4), make_policy("oracle", scenario, 4)
-    batch.reset(TUNING)
-    while not batch.over.all():
-        policy.active[:] = ~batch.over
-        batch.step(policy.act(batch.swarm.percept))
-    assert np.mean([batch.task.metrics(w)["success_share"] for w in range(4)]) >= 0.95
 
 
 def test_to_stay_pays_by_the_second_and_all_that_is_left_once_all_are_there():
@@ -194,23 +161,8 @@ def test_to_stay_pays_by_the_second_and_all_that_is_left_once_all_are_there():
     np.testing.assert_allclose(paid[1:], 20.0 * (1.0 - 5.0 / limit))
 
 
-@pytest.mark.parametrize(("changes", "message"), [
-    ({"task.gap_aside_m": 100.0}, "task.gap_m and task.gap_aside_m must leave a wall on both sides within "
-     "task.half_width_m = 120, got 128"),
-    ({"task.gap_m": [20.0, 10.0]}, r"task.gap_m must be \[low, high\] with low <= high"),
-    ({"task.gap_m": [1.0, 2.0]}, r"task.gap_m must be above 2, twice collision.hull_radius_m, got \[1.0, 2.0\]"),
-    ({"task.apart_m": 30.0}, "task.apart_m must be at least .*, so that groups .* m long start before the wall"),
-    ({"start.width_m": 210.0}, "the groups must start within the banks of task 'two_swarms'"),
-])  # fmt: skip
-def test_numbers_that_can_not_be_are_refused(changes, message):
-    with pytest.raises(ScenarioError, match=message):
-        waters(**changes)
-
-
 def test_a_carrot_is_ahead_at_its_speed_and_to_starboard_and_ends_at_the_goal():
-    scenario = load_scenario("two_swarms")
-    swarm, policy = Swarm(scenario), make_policy("carrot,right_m=7,ahead_m=6,speed=3", scenario)
-    swarm.reset(TUNING)
+    swarm, policy = piloted("carrot,right_m=7,ahead_m=6,speed=3", "two_swarms", seed=TUNING)
     swarm.state.eta[0, 0, :2] = swarm.world_map.waypoints[0, 0, 1] + (3.0, 0.0)
     percept = swarm.observe()
     with_carrot, goal = policy.with_carrot(percept), percept["reference"].astype(float)

@@ -9,12 +9,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from research.dynamics import acceptance
+from tests.swarms import fly, piloted, started
 from uuv_marl import load_scenario
-from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.benchmark import handling
 from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, vehicle_names
 from uuv_marl.scenario.turning import turning_radius
-from uuv_marl.sim.swarm import Swarm
 
 SLOW = {"trajectory.speed_mps": 1.0, "start.speed_max_mps": 1.0, "timing.integration_step_s": 0.0125}
 
@@ -114,11 +113,7 @@ def fossen(source, asked):
 @pytest.mark.parametrize(("name", "source"), [("lauv", Lauv), ("remus100", Remus)])
 def test_a_minute_of_a_steady_turn_is_scipys(name, source):
     """Full thrust and half the rudder to starboard, from rest, lags included."""
-    scenario = load_scenario(
-        "tracking", num_vehicles=1, overrides=SLOW | {"vehicle": name, "timing.integration_step_s": 0.01}
-    )
-    swarm = Swarm(scenario)
-    swarm.reset(0)
+    swarm = started("tracking", SLOW | {"vehicle": name, "timing.integration_step_s": 0.01}, n=1)
     swarm.state.eta[...] = swarm.state.nu[...] = 0.0
     for _ in range(600):
         swarm.step(np.array([[[1.0, 0.5]]], np.float32))
@@ -137,14 +132,10 @@ def test_a_minute_of_a_steady_turn_is_scipys(name, source):
 @pytest.mark.parametrize("name", handling.every())
 def test_every_vehicle_and_variant_runs_and_is_shown(name, tmp_path):
     changes = SLOW | {"vehicle": name, "trajectory.speed_mps": 0.5}
-    scenario = with_policy_requirements(
-        "bio_inspired_plus", load_scenario("single_obstacle", num_vehicles=4, overrides=changes)
-    )
+    swarm, policy = piloted("bio_inspired_plus", "single_obstacle", changes, n=4)
+    scenario = swarm.scenario
     assert scenario.vehicle.name == name
-    swarm, policy = Swarm(scenario), make_policy("bio_inspired_plus", scenario)
-    percept = swarm.reset(0)
-    for _ in range(20):
-        percept = swarm.step(policy.act(percept))
+    fly(swarm, policy, 20)
     assert np.isfinite(swarm.state.eta).all()
     assert (swarm.state.nu[0, :, 0] > 0.0).any()
     (tmp_path / "again.toml").write_text(to_toml(scenario))
@@ -170,19 +161,27 @@ def test_a_file_of_ones_own_has_variants_too(tmp_path):
     assert load_scenario(tmp_path / "course.toml").vehicle == heavy.vehicle
 
 
+HEAVY = "\n[variants.heavy.vehicle]\n"
+
+
 @pytest.mark.parametrize(
-    ("variants", "name", "message"),
+    ("before", "after", "name", "message"),
     [
-        ("[variants.heavy.vehicle]\nm_kg = 25.0", "havy", "has no variant 'havy'; it has heavy"),
-        ("[variants.heavy]\nm_kg = 25.0", "heavy", "variants.heavy must hold tables, such as [variants.heavy.vehicle]"),
-        ("[variants.heavy.vehicle]\nmass = 25.0", "heavy", "vehicle.mass is unknown"),
+        (r"\Z", f"{HEAVY}m_kg = 25.0", "+havy", "has no variant 'havy'; it has heavy"),
+        (r"\Z", "\n[variants.heavy]\nm_kg = 25.0", "+heavy", "must hold tables, such as [variants.heavy.vehicle]"),
+        (r"\Z", f"{HEAVY}mass = 25.0", "+heavy", "vehicle.mass is unknown"),
+        ("^m_kg = .*", "", "", "lacks vehicle.m_kg; add this number to the file"),
+        ("^lever_arm_m = .*", "", "", "lacks actuators.lever_arm_m"),
+        (r"^\[vehicle\]", "[swarm]\nnum_vehicles = 3\n[vehicle]", "", "may hold vehicle and actuators only"),
+        ("^m_kg = .*", "m_kg = ", "", "is not valid TOML"),
     ],
 )
-def test_a_variant_that_is_none_is_refused(variants, name, message, tmp_path):
-    own = tmp_path / "mine.toml"
-    own.write_text(show_vehicle("lauv") + variants)
+def test_a_vehicle_file_that_is_not_complete_or_lacks_a_variant_is_refused(before, after, name, message, tmp_path):
+    own, (text, changes) = tmp_path / "mine.toml", re.subn(before, after, show_vehicle("lauv"), count=1, flags=re.M)
+    assert changes == 1
+    own.write_text(text)
     with pytest.raises(ScenarioError, match=re.escape(message)):
-        load_scenario("tracking", overrides=SLOW | {"vehicle": f"{own}+{name}"})
+        load_scenario("tracking", overrides=SLOW | {"vehicle": f"{own}{name}"})
 
 
 def test_a_vehicle_that_replaces_another_leaves_nothing_of_it():

@@ -115,3 +115,9 @@ def test_plain_english_is_not_refused(text):
 )  # fmt: skip
 def test_private_senses_are_found(text):
     assert private(text)
+
+
+def test_pages_that_the_code_names_exist():
+    for source in (path for folder in ("uuv_marl", "perf", "tools") for path in (ROOT / folder).rglob("*.py")):
+        for name in re.findall(r"\bdocs/[\w./-]+", source.read_text(encoding="utf-8")):
+            assert (ROOT / name.rstrip(".")).exists(), f"{source} names {name}"

@@ -113,18 +113,9 @@ def invented(better=()):
                 for each in task.sets:
                     values = dict.fromkeys(cells.MEASURES, "1") | {"share": f"{share:.3g}", "time_ratio": ""}
                     rows += [place | {"set": each.name, "seed": str(seed)} | values for seed in (7000, 7001)]
+                measured = {"minutes": "1.00", "share": "0.1", "swarm_success": "0", "collisions_per_vehicle": "2"}
                 if who in LEARNERS:
-                    curves += [
-                        place
-                        | {
-                            "agent_steps": str(k),
-                            "minutes": "1.00",
-                            "share": "0.1",
-                            "swarm_success": "0",
-                            "collisions_per_vehicle": "2",
-                        }
-                        for k in (1000, 2000)
-                    ]
+                    curves += [place | measured | {"agent_steps": str(k)} for k in (1000, 2000)]
     return curves, rows
 
 
@@ -232,16 +223,12 @@ def test_all_learners_have_one_axis():
 
 
 def test_a_step_is_the_nearest_measure_and_after_its_end_a_training_stays_at_its_last():
-    place = {
-        "task": "hard_water",
-        "learner": next(iter(LEARNERS)),
-        "training": "0",
-        "swarm_success": "0",
-        "collisions_per_vehicle": "0",
-    }
+    learner = next(iter(LEARNERS))
+    row = {"task": "hard_water", "learner": learner, "training": "0", "minutes": "1"}
+    row |= {"swarm_success": "0", "collisions_per_vehicle": "0"}
     ends = {400_000: "0.1", 700_000: "0.2", 1_600_000: "0.3"}
-    curve = [{**place, "agent_steps": str(k), "minutes": "1", "share": share} for k, share in ends.items()]
-    run = marl_eval(curve, [])["uuv_marl"]["hard_water"][place["learner"]]["seed_0"]
+    curve = [{**row, "agent_steps": str(k), "share": share} for k, share in ends.items()]
+    run = marl_eval(curve, [])["uuv_marl"]["hard_water"][learner]["seed_0"]
     assert [step["share"] for step in run.values()] == [[0.1], [0.2], *[[0.3]] * (protocol.MEASURES - 2)]
 
 
@@ -260,18 +247,18 @@ def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
     others.check_complete(rows, few)
     for row in rows[::3]:
         others.check_equal(row, "scout", few)
-    with pytest.raises(ResultsError, match="set hard_water must have the seeds 7000 to 7001 once each, got 1 rows"):
-        others.check_complete(rows[1:], few)
+    for wrong, message in (
+        (rows[1:], "set hard_water must have the seeds 7000 to 7001 once each, got 1 rows"),
+        ([{**rows[0], "set": "lake"}], "set must be one of hard_water, .*, got 'lake'"),
+        ([], "the columns must be set, .*, got no rows"),
+        ([{**row, "colour": "blue"} for row in rows], "the columns must be set, seed, share, .*, got set, .*, colour"),
+    ):
+        with pytest.raises(ResultsError, match=message):
+            others.check_complete(wrong, few)
     with pytest.raises(ResultsError, match="set hard_water, seed 7000 differs: min_spacing_m 9.9, now"):
         others.check_equal({**rows[0], "min_spacing_m": "9.9"}, "scout", few)
     with pytest.raises(ResultsError, match="seed 7000 differs: "):
         others.check_equal(rows[0], "random", few)
-    with pytest.raises(ResultsError, match="set must be one of hard_water, .*, got 'lake'"):
-        others.check_complete([{**rows[0], "set": "lake"}], few)
-    with pytest.raises(ResultsError, match="the columns must be set, .*, got no rows"):
-        others.check_complete([], few)
-    with pytest.raises(ResultsError, match="the columns must be set, seed, share, .*, got set, .*, colour"):
-        others.check_complete([{**row, "colour": "blue"} for row in rows], few)
 
 
 @pytest.mark.parametrize("name", LEARNERS)

@@ -1,6 +1,5 @@
 """RLlib: the same environment bit for bit, and its example."""
 
-import importlib.util
 import os
 import subprocess
 import sys
@@ -23,17 +22,14 @@ with warnings.catch_warnings():
 
 import uuv_marl
 from tests import contract
+from tests.processes import module_of
 from uuv_marl.envs.rllib import ENV_NAME, SwarmMultiAgentEnv, register
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 4.0}
-LOSES = {"losses.times_s": [1.0, 2.0]}
+LOSSY = {"scenario": "lossy", "num_vehicles": 5, "overrides": {**SHORT, **contract.LOSES}}
 EXAMPLE = ROOT / "examples" / "training" / "rllib.py"
-spec = importlib.util.spec_from_file_location("rllib_example", EXAMPLE)
-assert spec
-assert spec.loader
-example = importlib.util.module_from_spec(spec)  # not in sys.modules, so that Ray takes its functions along
-spec.loader.exec_module(example)
+example = module_of(EXAMPLE)  # not in sys.modules, so that Ray takes its functions along
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning:ray"),
@@ -88,7 +84,9 @@ def play(env, seed=0):
 
 
 def test_a_lost_vehicle_leaves_alone_and_the_time_limit_truncates_the_others():
-    outcomes = play(SwarmMultiAgentEnv({"scenario": "lossy", "num_vehicles": 5, "overrides": {**SHORT, **LOSES}}))
+    outcomes = play(
+        SwarmMultiAgentEnv({"scenario": "lossy", "num_vehicles": 5, "overrides": {**SHORT, **contract.LOSES}})
+    )
     lost = [[agent for agent, flag in outcome[3].items() if flag] for outcome in outcomes]
     times = [t for t, names in enumerate(lost) for _ in names]
     assert len(times) == 2
@@ -115,7 +113,7 @@ def test_the_loss_of_everybody_terminates_all():
 
 
 def test_rllib_bootstraps_at_the_time_limit_and_not_after_a_loss():
-    env = SwarmMultiAgentEnv({"scenario": "lossy", "num_vehicles": 5, "overrides": {**SHORT, **LOSES}})
+    env = SwarmMultiAgentEnv(LOSSY)
     episode = MultiAgentEpisode(agent_to_module_mapping_fn=lambda *_: "shared")
     episode.add_env_reset(observations=env.reset(seed=0)[0])
     for actions, observations, rewards, terminateds, truncateds, infos in play(env):

@@ -83,17 +83,6 @@ def campaign(kinds, seed, share):
     return counts
 
 
-def table(counts, crashed):
-    """Markdown, a row for each kind."""
-    lines = ["| input | cases | " + " | ".join(OUTCOMES) + " |", "|" + " --- |" * (len(OUTCOMES) + 2)]
-    for kind, counter in counts.items():
-        cells = [kind.replace("_", " "), str(counter.total()), *(str(counter[outcome]) for outcome in OUTCOMES)]
-        lines.append("| " + " | ".join(cells) + " |")
-    lines += ["", "| program | stopped at | times | lost | can't go on | differs |", "|" + " --- |" * 6]
-    lines += ["| " + " | ".join(map(str, row)) + " |" for row in crashed]
-    return "\n".join(lines) + "\n"
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=13, help="of all random numbers")
@@ -108,7 +97,6 @@ def main():
         return
     counts = campaign(kinds, given.seed, given.share)
     crashed = crashes.campaign(given.share) if not given.only or "crashes" in given.only else []
-    print(table(counts, crashed))
     bad = sum(counter[outcome] for counter in counts.values() for outcome in OUTCOMES[2:])
     sys.exit(bad > 0 or any(sum(row[3:]) for row in crashed))
 

@@ -125,5 +125,6 @@ def campaign(share=1.0, seed=13):
                 for k in range(max(int(kills * share), 1))
             ]
             rows.append((name, "SIGKILL", len(found), *map(sum, zip(*found, strict=True))))
-            print(*rows[-2:], sep="\n", flush=True)
+            for *where, times, lost, stuck, differs in rows[-2:]:
+                print(*where, f"{times} times: {lost} lost, {stuck} can't go on, {differs} differ", flush=True)
     return rows

@@ -4,7 +4,6 @@ A case ends in "accepted" or "refused" (a clear error). Everything else that can
 """
 
 import copy
-import io
 import json
 import math
 import shutil
@@ -15,15 +14,15 @@ from pathlib import Path
 import numpy as np
 import safetensors.numpy
 from gymnasium.error import ResetNeeded
-from typer.testing import CliRunner
 
 import uuv_marl
 from tests.nets import ANYWHERE
 from tests.players import CYCLES, PLAYERS, compare, suited
+from tests.processes import cli
+from tests.swarms import fly, piloted, started
 from uuv_marl import load_scenario, scenario_names
 from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
 from uuv_marl.benchmark.results import Results
-from uuv_marl.cli import app
 from uuv_marl.errors import DivergenceError, PolicyError, ResultsError, ScenarioError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import parse_override
@@ -121,16 +120,11 @@ def scenarios_that_run(rng, folder):
         finite(list(rewards.values()))
     name = pick(rng, ("bio_inspired", "sff", "sdc", "mappo"))
     try:
-        suited = with_policy_requirements(name, scenario)
-        policy = make_policy(name, suited)
+        swarm, policy = piloted(name, scenario, seed=1)
     except (PolicyError, ScenarioError):
         return
-    swarm = Swarm(suited)
-    percept = swarm.reset(1)
     policy.reset(1)
-    for _ in range(6):
-        percept = swarm.step(policy.act(percept))
-    finite(percept.flat)
+    finite(fly(swarm, policy, 6).flat)
 
 
 def toml_bytes(rng, folder):
@@ -239,8 +233,7 @@ def actions(rng, folder):
         observations, rewards, *_ = envs.step([given, given] if rng.random() < 0.5 else given)
         finite(observations, rewards)
     elif how == 2:
-        swarm = Swarm(load_scenario("starter", num_vehicles=n))
-        swarm.reset(0)
+        swarm = started("starter", n=n)
         finite(swarm.step([given] if rng.random() < 0.5 else given).flat)
     else:
         import gymnasium
@@ -307,10 +300,7 @@ def foreign_percepts(rng, folder):
 
 
 def snapshots(rng, folder):
-    scenario = load_scenario(pick(rng, ("lossy", "random_field", "starter")), num_vehicles=7)
-    scenario = load_scenario(scenario, overrides={"losses.times_s": [1.0, 2.0]})
-    swarm = Swarm(scenario, 2)
-    swarm.reset(3)
+    swarm = started(pick(rng, ("lossy", "random_field", "starter")), {"losses.times_s": [1.0, 2.0]}, 2, 3, n=7)
     snapshot = swarm.snapshot()
     name = pick(rng, list(snapshot))
     if rng.random() < 0.3:
@@ -329,8 +319,7 @@ def snapshots(rng, folder):
 
 def states_by_hand(rng, folder):
     n = int(pick(rng, (1, 2, 6, 54, 260, 400)))
-    swarm = Swarm(load_scenario("single_obstacle", num_vehicles=n))
-    swarm.reset(0)
+    swarm = started("single_obstacle", n=n)
     how = rng.integers(5)
     place = swarm.state.eta[0, :, :2]
     if how == 0:
@@ -362,25 +351,23 @@ def checkpoints(rng, folder):
     elif how == 2:
         at = int(rng.integers(8, 8 + length))
         data[at : at + int(rng.integers(1, 30))] = bytes(rng.integers(32, 127, int(rng.integers(0, 30)), np.uint8))
-    elif how == 3:
-        tensors = safetensors.numpy.load(bytes(data))
-        meta = json.loads(data[8 : 8 + length])["__metadata__"]
-        name = pick(rng, list(tensors))
-        old = tensors[name]
-        forms = (old * np.float32(np.nan), old[..., None], old[:1], old.astype(np.float64), np.full_like(old, 1e38))
-        tensors[name] = pick(rng, forms)
-        data = bytearray(safetensors.numpy.save({k: np.ascontiguousarray(v) for k, v in tensors.items()}, meta))
     else:
         tensors = safetensors.numpy.load(bytes(data))
         meta = json.loads(data[8 : 8 + length])["__metadata__"]
-        card = json.loads(meta["uuv_marl"])
-        card[pick(rng, list(card))] = pick(rng, [thing for thing in THINGS if not isinstance(thing, bytes)])
-        data = bytearray(safetensors.numpy.save(tensors, {"uuv_marl": json.dumps(card)}))
+        if how == 3:
+            name = pick(rng, list(tensors))
+            old = tensors[name]
+            forms = (old * np.float32(np.nan), old[..., None], old[:1], old.astype(np.float64), np.full_like(old, 1e38))
+            tensors[name] = np.ascontiguousarray(pick(rng, forms))
+        else:
+            card = json.loads(meta["uuv_marl"])
+            card[pick(rng, list(card))] = pick(rng, [thing for thing in THINGS if not isinstance(thing, bytes)])
+            meta = {"uuv_marl": json.dumps(card)}
+        data = safetensors.numpy.save(tensors, meta)
     path = folder / "policy.safetensors"
     path.write_bytes(bytes(data))
-    scenario = with_policy_requirements(str(folder), load_scenario("random_field", num_vehicles=4))
-    policy, swarm = make_policy(str(folder), scenario), Swarm(scenario)
-    finite(policy.act(swarm.reset(0)))
+    swarm, policy = piloted(str(folder), "random_field", n=4)
+    finite(policy.act(swarm.percept))
 
 
 def results_folders(rng, folder):
@@ -427,13 +414,10 @@ def prepare(folder):
     """Make what the cases start from, and compile what they need, so that their time limit is for them alone."""
     global SOURCE_RESULTS  # noqa: PLW0603
     SOURCE_RESULTS = folder / "source"
-    done = CliRunner().invoke(
-        app, ["benchmark", "--scenario", "starter", "--policy", "idle", "--seeds", "2", "--output", str(SOURCE_RESULTS)]
-    )
-    assert done.exit_code == 0, done.output
+    words = ["--scenario", "starter", "--policy", "idle", "--seeds", "2", "--output", SOURCE_RESULTS]
+    assert cli("benchmark", *words)[0] == 0
     for name in POLICIES:
-        scenario = with_policy_requirements(name, load_scenario(TASKS_OF.get(name, "single_obstacle")))
-        make_policy(name, scenario).act(Swarm(scenario).reset(0))
+        fly(*piloted(name, TASKS_OF.get(name, "single_obstacle")), 1)
     for name in scenario_names():
         env = uuv_marl.parallel_env(load_scenario(name, overrides={"current.speed_mps": 0.1}))  # what the sea does, too
         env.reset(seed=0)
@@ -468,12 +452,7 @@ def command_line(rng, folder):
         word in line for word in ("--help", "-h", "0", "-1", "x", "²", "nowhere", "/dev/null", ":", "a:b")
     ):
         line.append("--nothing-like-this")  # so that no long work begins
-    out = io.StringIO()
-    done = CliRunner().invoke(app, line)
-    out.write(done.output)
-    if done.exception is not None and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    return "accepted" if done.exit_code == 0 else "refused"
+    return "accepted" if cli(*line)[0] == 0 else "refused"
 
 
 COUNTS = {
