@@ -101,7 +101,7 @@ class Acts(Policy):
 
 
 def test_bad_combinations_are_refused_with_the_remedy():
-    with pytest.raises(PolicyError, match=r"'Acts' must define decide\(percept\), and leave act, .* alone"):
+    with pytest.raises(PolicyError, match=r":Acts' must define decide\(percept\), and leave act, .* alone"):
         make_policy("tests.test_rudder:Acts", LAUV)
     with pytest.raises(PolicyError, match=r"mappo was trained on another vehicle .* any_vehicle=True"):
         make_policy("mappo", with_policy_requirements("mappo", LAUV))
