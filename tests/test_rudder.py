@@ -107,7 +107,7 @@ def test_bad_combinations_are_refused_with_the_remedy():
         make_policy("mappo", with_policy_requirements("mappo", LAUV))
     rov = with_vehicle("bluerov2_heavy", speed=0.5)
     needed = re.escape(f"a yaw damping of {inner_loop_nms(600.0, 3000.0, rov):g} N m s")
-    with pytest.raises(PolicyError, match=f"Scout needs {needed}"):
+    with pytest.raises(PolicyError, match=f"scout needs {needed}"):
         make_policy("scout", rov)
 
 
