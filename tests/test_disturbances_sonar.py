@@ -294,7 +294,7 @@ def test_outages_have_the_given_rate_and_length(probability, length):
     swarm = started("starter", overrides, n=1)
     own, num, silent_at = swarm._disturbances, 100_000, getattr(is_silent, "py_func", is_silent)
     silent = np.array(
-        [silent_at(Reading(0, 1, m, m, 0), 0, own.keys[0], own.noise, own.sensor_errors) for m in range(num)]
+        [silent_at(Reading(0, 1, m, m, 0), 0, own.keys[0], own.noise_model, own.sensor_errors) for m in range(num)]
     )
     edges = np.flatnonzero(np.diff(np.concatenate([[0], silent, [0]])))
     assert ((edges[1::2] - edges[::2])[:-1] % length == 0).all()

@@ -217,8 +217,8 @@ def test_random_fields_are_feasible(seed, n):
     scenario = load_scenario("random_field", num_vehicles=n)
     waypoints, obstacles = sample_field(scenario, np.random.default_rng(seed))
     again = sample_field(scenario, np.random.default_rng(seed))
-    np.testing.assert_array_equal(waypoints, again.waypoints)
-    np.testing.assert_array_equal(obstacles, again.obstacles)
+    np.testing.assert_array_equal(waypoints, again[0])
+    np.testing.assert_array_equal(obstacles, again[1])
     assert len(obstacles) <= scenario.random_field.obstacles[1]
     gap = 2 * (scenario.constraints.s_o_m + scenario.constraints.s_u_m)
     for k, (x, y, radius) in enumerate(obstacles):

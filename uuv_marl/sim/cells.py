@@ -26,12 +26,9 @@ class Grid(NamedTuple):
     living: int
     x_min: float
     y_min: float
-    side: float
-    """Side of a cell [m]; infinite for one cell."""
-    columns: int
-    """Cells along y."""
-    rows: int
-    """Cells along x."""
+    side: float  # side of a cell [m]; infinite for one cell
+    columns: int  # cells along y
+    rows: int  # cells along x
 
 
 @compiled

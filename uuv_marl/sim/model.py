@@ -24,26 +24,18 @@ class Rules(NamedTuple):
 
     control_step_s: float
     step_s: float
-    control_steps: int
-    """Control steps of a decision."""
-    steps: int
-    """Integration steps of a control step."""
-    hull_radius: float
-    """Radius of a hull [m]."""
-    collision_ends: bool
-    """Whether a vehicle that collides is lost."""
-    collision_stops: bool
-    """Whether it stops there."""
-    passes: bool
-    """Whether the swarm arrives by passing the end, and l(t) moves on beyond it (``arrival.criterion``)."""
-    dwell_ticks: int
-    """Control steps that the swarm must stay to have arrived; 0 in passage."""
+    control_steps: int  # control steps of a decision
+    steps: int  # integration steps of a control step
+    hull_radius: float  # radius of a hull [m]
+    collision_ends: bool  # whether a vehicle that collides is lost
+    collision_stops: bool  # whether it stops there
+    passes: bool  # whether the swarm arrives by passing the end, and l(t) moves on beyond it (``arrival.criterion``)
+    dwell_ticks: int  # control steps that the swarm must stay to have arrived; 0 in passage
+    # Largest distance of a vehicle from the end at arrival; in passage, from the centre's projection onto the leg
     spread: float
-    """Largest distance of a vehicle from the end at arrival; in passage, from the centre's projection onto the leg."""
+    # Arrival radii of the swarm's centre, the scenario's own first (infinite in passage), shape (radius,)
     arrival_radii: Float64
-    """Arrival radii of the swarm's centre, the scenario's own first (infinite in passage), shape (radius,)."""
-    loss_ticks: Int64
-    """Control step at whose end each loss happens, shape (loss,)."""
+    loss_ticks: Int64  # control step at whose end each loss happens, shape (loss,)
     cell_side: float
 
 

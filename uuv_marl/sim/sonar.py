@@ -26,31 +26,22 @@ _MIN_BINS = 1024
 class SonarSuite(NamedTuple):
     """The arrays' sub-sectors, whose edges are unit vectors, and the table that finds a direction's sub-sector."""
 
-    lower: Float64
-    """Lower edge of each sub-sector, shape (sector, 2)."""
-    upper: Float64
-    """Upper edge of each sub-sector, shape (sector, 2)."""
+    lower: Float64  # lower edge of each sub-sector, shape (sector, 2)
+    upper: Float64  # upper edge of each sub-sector, shape (sector, 2)
+    # Squared range of each sub-sector [m2], and -1 for directions outside all, shape (sector + 1,)
     squared_range: Float64
-    """Squared range of each sub-sector [m2], and -1 for directions outside all, shape (sector + 1,)."""
+    # Sub-sector of each bin of direction, or sector + 1 + index of the edge in it, shape (layer, bin). The number of
+    # bins is a power of two.
     codes: Int64
-    """Sub-sector of each bin of direction, or sector + 1 + index of the edge in it, shape (layer, bin).
-    The number of bins is a power of two."""
-    edges: Float64
-    """Edges between sub-sectors of a layer, shape (edge, 2)."""
-    sides: Int64
-    """Sub-sectors counter-clockwise and clockwise of each edge, shape (edge, 2)."""
-    active: Int64
-    """The active sub-sectors, shape (active,)."""
-    active_range: Float64
-    """Their ranges [m], shape (active,)."""
-    reach: float
-    """The longest of them [m], 0 for none."""
+    edges: Float64  # edges between sub-sectors of a layer, shape (edge, 2)
+    sides: Int64  # sub-sectors counter-clockwise and clockwise of each edge, shape (edge, 2)
+    active: Int64  # the active sub-sectors, shape (active,)
+    active_range: Float64  # their ranges [m], shape (active,)
+    reach: float  # the longest of them [m], 0 for none
+    # Lower and upper edge, unit vectors, of a cone around all active sub-sectors; zeros if not below 180 deg
     cone: tuple[float, float, float, float]
-    """Lower and upper edge, unit vectors, of a cone around all active sub-sectors; zeros if not below 180 deg."""
-    reports_surface: bool
-    """Whether an echo's position is the detected surface point, not the obstacle's centre."""
-    obstacles_hide: bool
-    """Whether an obstacle on the line of sight hides a vehicle."""
+    reports_surface: bool  # whether an echo's position is the detected surface point, not the obstacle's centre
+    obstacles_hide: bool  # whether an obstacle on the line of sight hides a vehicle
 
 
 def suite(scenario: Scenario) -> SonarSuite:

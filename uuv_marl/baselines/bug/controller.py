@@ -62,16 +62,6 @@ class TangentBug(Filtered):
 
 
 @compiled
-def _desired_velocity(w: int, i: int, g: BugGains, memory: Surroundings, walls: Walls) -> tuple[float, float]:
-    """Desired velocity in the vehicle's map [m/s]."""
-    pose, goal = memory.pose[w, i], memory.reference[w, i]
-    speed = min(g.cruise, g.pull * math.hypot(goal[0] - pose[0], goal[1] - pose[1]))
-    return pushed(
-        speed * walls.direction[w, i, 0], speed * walls.direction[w, i, 1], w, i, g.push, g.push_range, memory
-    )
-
-
-@compiled
 def _decide_all(
     worlds: Bool, period: float, g: BugGains, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings,
     walls: Walls, planes: Float64, action: Float32,
@@ -79,7 +69,9 @@ def _decide_all(
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and memory.begun[w, i] > 0.0:
-                w_x, w_y = _desired_velocity(w, i, g, memory, walls)
+                pose, goal, direction = memory.pose[w, i], memory.reference[w, i], walls.direction[w, i]
+                speed = min(g.cruise, g.pull * math.hypot(goal[0] - pose[0], goal[1] - pose[1]))
+                w_x, w_y = pushed(speed * direction[0], speed * direction[1], w, i, g.push, g.push_range, memory)
                 num = wall_planes(w, i, period, barrier, limits, memory, walls, planes)
                 num = neighbour_planes(w, i, num, period, barrier, memory, planes)
                 steer_safely(w, i, w_x, w_y, num, planes, gain, limits, memory, action)

@@ -56,16 +56,10 @@ class LeaderFollower(Filtered):
         super().__init__(scenario, num_worlds, barrier or own_barrier)
         self.gains = gains or own_gains
 
-    @property
-    def memory_s(self) -> float:
-        """Time for which an undetected neighbour is remembered [s]."""
-        return float(self.gains.memory_s)
-
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        flat = self.flat(percept)
-        leads = percept["informed"] if "informed" in percept.names else np.ones((*flat.shape[:2], 1), np.float32)
-        action = np.zeros((*flat.shape[:2], 2), np.float32)
+        action = np.zeros((self.num_worlds, self.scenario.swarm.num_vehicles, 2), np.float32)
+        leads = percept["informed"] if "informed" in percept.names else np.ones_like(action[..., :1])
         _act(
             leads, self.active, self.model.own.period_s, LeaderFollowerGains(*map(float, self.gains)), self.barrier,
             self.limits, self.gain, self.memory, self.planes, action,

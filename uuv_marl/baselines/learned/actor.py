@@ -50,7 +50,7 @@ class Actor(Policy):
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
         z = self._features(percept, self.active)
-        state = self.memory.state[self.active].reshape(len(z), -1) if self.Memory else None
+        state = self.memory.state[self.active].reshape(-1, self.axes["unit"]) if self.Memory else None
         action = self._network.output(z, state)
         bound(action, in_disc(self))
         whole = np.zeros((*percept.flat.shape[:2], 2), np.float32)

@@ -49,8 +49,8 @@ class Filtered(Policy):
 
     @property
     def memory_s(self) -> float:
-        """Time for which an undetected neighbour is remembered [s]."""
-        return MEMORY_S
+        """Time for which an undetected neighbour is remembered [s]: a gain, if there is one."""
+        return float(getattr(getattr(self, "gains", None), "memory_s", MEMORY_S))
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Update the memory from the percept."""

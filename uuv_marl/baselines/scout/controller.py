@@ -42,11 +42,6 @@ class Scout(Filtered):
         self.gains = gains or numbers.gains
         self._growth = growth(scenario.swarm.num_vehicles)
 
-    @property
-    def memory_s(self) -> float:
-        """Time for which an undetected neighbour is remembered [s]."""
-        return float(self.gains.memory_s)
-
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it is in the memory
         """Actions of shape (world, vehicle, 2)."""
         action = np.zeros((self.num_worlds, self.scenario.swarm.num_vehicles, 2), np.float32)

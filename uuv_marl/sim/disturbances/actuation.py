@@ -30,22 +30,15 @@ PLANT = len(Plant._fields)
 class Actuation(NamedTuple):
     """Constants of a scenario's lags, yaw authority and faults."""
 
+    # Share of the difference between commanded and actual thrust that remains after half an integration step
     thrust_half: float
-    """Share of the difference between commanded and actual thrust that remains after half an integration step."""
-    thrust_whole: float
-    """Share that remains of it after a whole step; 0 without a lag."""
-    yaw_half: float
-    """The same for the torque, after half an integration step."""
-    yaw_whole: float
-    """The same for the torque, after a whole step."""
-    yaw_authority: float
-    """Share of the commanded torque that acts on the vehicle."""
-    kind: Int64
-    """Kind of each fault: ``THRUSTER``, ``YAW``, ``ARRAY`` or ``MEMBER``, shape (fault,)."""
-    efficiency: Float64
-    """Share of thrust or torque that remains under a fault, shape (fault,)."""
-    array: Int64
-    """Index of the array that a fault disables, -1 for none, shape (fault,)."""
+    thrust_whole: float  # share that remains of it after a whole step; 0 without a lag
+    yaw_half: float  # the same for the torque, after half an integration step
+    yaw_whole: float  # the same for the torque, after a whole step
+    yaw_authority: float  # share of the commanded torque that acts on the vehicle
+    kind: Int64  # kind of each fault: ``THRUSTER``, ``YAW``, ``ARRAY`` or ``MEMBER``, shape (fault,)
+    efficiency: Float64  # share of thrust or torque that remains under a fault, shape (fault,)
+    array: Int64  # index of the array that a fault disables, -1 for none, shape (fault,)
 
 
 @described

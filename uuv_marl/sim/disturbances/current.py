@@ -30,20 +30,13 @@ _PEAK = 0.638172686
 class WaterModel(NamedTuple):
     """Constants of a scenario's current."""
 
-    speed: float
-    """Speed of the mean current [m/s]."""
-    direction: float
-    """Direction to which the mean current flows [rad], NaN if random."""
-    deviation: float
-    """Standard deviation of the process [m/s]."""
-    remains: float
-    """Autocorrelation of the process over a control step."""
-    circulation: float
-    """Circulation of an eddy [m2/s]."""
-    core: float
-    """Radius of an eddy's core [m]."""
-    over_ground: bool
-    """Whether a vehicle measures its velocity over ground, not through the water."""
+    speed: float  # speed of the mean current [m/s]
+    direction: float  # direction to which the mean current flows [rad], NaN if random
+    deviation: float  # standard deviation of the process [m/s]
+    remains: float  # autocorrelation of the process over a control step
+    circulation: float  # circulation of an eddy [m2/s]
+    core: float  # radius of an eddy's core [m]
+    over_ground: bool  # whether a vehicle measures its velocity over ground, not through the water
 
 
 @described

@@ -28,12 +28,9 @@ _MAX_AGE_S = 4096.0
 class ModemModel(NamedTuple):
     """Constants of a scenario's messages."""
 
-    round_s: float
-    """Time between two messages of a vehicle [s]."""
-    control_step_s: float
-    """Length of a control step [s]."""
-    loss: float
-    """Probability that a receiver loses a message."""
+    round_s: float  # time between two messages of a vehicle [s]
+    control_step_s: float  # length of a control step [s]
+    loss: float  # probability that a receiver loses a message
 
 
 @described

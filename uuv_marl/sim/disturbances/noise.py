@@ -37,34 +37,21 @@ _NEVER = 2**40
 class NoiseModel(NamedTuple):
     """Constants of a scenario's sonar errors."""
 
-    bearing: float
-    """Standard deviation of a bearing [rad]."""
-    range_m: float
-    """Standard deviation of a range [m] ..."""
-    range_share: float
-    """... plus this share of it."""
-    factor_log_sd: float
-    """Standard deviation of the logarithm of the factor on passive ranges."""
-    passive_ranges: bool
-    """Whether passive arrays measure ranges."""
-    nominal_range: float
-    """Distance reported where only a bearing is measured [m]."""
-    half_range: Float64
-    """Range at which an array detects with probability 1/2 [m], 0: always detects; shape (array,)."""
+    bearing: float  # standard deviation of a bearing [rad]
+    range_m: float  # standard deviation of a range [m]
+    range_share: float  # ... plus this share of it
+    factor_log_sd: float  # standard deviation of the logarithm of the factor on passive ranges
+    passive_ranges: bool  # whether passive arrays measure ranges
+    nominal_range: float  # distance reported where only a bearing is measured [m]
+    half_range: Float64  # range at which an array detects with probability 1/2 [m], 0: always detects; shape (array,)
+    # Standard deviation of the signal excess, as natural logarithm of the equivalent range, shape (array,)
     decades: Float64
-    """Standard deviation of the signal excess, as natural logarithm of the equivalent range, shape (array,)."""
-    silence: float
-    """Probability that an outage of an array begins at a reading ..."""
-    silent_readings: int
-    """... and how many readings it lasts."""
-    false_echo: float
-    """Probability of a false detection, per sub-sector and reading."""
-    range: Float64
-    """Range of each array [m], shape (array,)."""
-    lower: Float64
-    """Lower edge of each sub-sector, a unit vector, shape (sector, 2)."""
-    width: Float64
-    """Width of the sub-sectors of each array [rad], shape (array,)."""
+    silence: float  # probability that an outage of an array begins at a reading
+    silent_readings: int  # ... and how many readings it lasts
+    false_echo: float  # probability of a false detection, per sub-sector and reading
+    range: Float64  # range of each array [m], shape (array,)
+    lower: Float64  # lower edge of each sub-sector, a unit vector, shape (sector, 2)
+    width: Float64  # width of the sub-sectors of each array [rad], shape (array,)
 
 
 @described

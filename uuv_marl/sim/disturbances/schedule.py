@@ -17,39 +17,26 @@ from uuv_marl.types import Float64, Int64
 class SonarTiming(NamedTuple):
     """Constants of the arrays' schedule and latency; times in control steps."""
 
-    ideal: bool
-    """Whether readings are immediate and without error, so that percepts stay unchanged."""
-    control_step_s: float
-    """Length of a control step [s]."""
-    control_steps: int
-    """Control steps of a decision."""
-    delay: int
-    """Control steps from the reception of a reading until a policy receives it."""
-    control_steps_per_metre: float
-    """Control steps that sound takes per metre; 0: none."""
-    compensated: bool
-    """Whether readings are moved to the present pose."""
-    every: Float64
-    """Control steps between two readings of each array, at least 1, shape (array,)."""
-    first: Int64
-    """First sub-sector of each array, and their number, shape (array + 1,)."""
+    ideal: bool  # whether readings are immediate and without error, so that percepts stay unchanged
+    control_step_s: float  # length of a control step [s]
+    control_steps: int  # control steps of a decision
+    delay: int  # control steps from the reception of a reading until a policy receives it
+    control_steps_per_metre: float  # control steps that sound takes per metre; 0: none
+    compensated: bool  # whether readings are moved to the present pose
+    every: Float64  # control steps between two readings of each array, at least 1, shape (array,)
+    first: Int64  # first sub-sector of each array, and their number, shape (array + 1,)
+    # First of its sub-sectors among the active ones, and their number, shape (array + 1,); none for passive arrays
     active: Int64
-    """First of its sub-sectors among the active ones, and their number, shape (array + 1,); none for passive arrays."""
 
 
 class Reading(NamedTuple):
     """One reading of an array, by all vehicles of a world."""
 
-    w: int
-    """Index of the world."""
-    a: int
-    """Index of the array."""
-    number: int
-    """Number of the reading among the array's."""
-    tick: int
-    """Control step of its reception."""
-    slot: int
-    """Slot of the delay line that stores the reading."""
+    w: int  # index of the world
+    a: int  # index of the array
+    number: int  # number of the reading among the array's
+    tick: int  # control step of its reception
+    slot: int  # slot of the delay line that stores the reading
 
 
 def sonar_timing(scenario: Scenario) -> SonarTiming:
