@@ -146,9 +146,6 @@ def test_the_command_line_from_end_to_end(tmp_path):
 def test_the_parameters_listed_are_those_that_a_policy_s_name_takes(name):
     text = cli("list", "policies", f"--show={name}")[1]
     listed = set(text.partition("Parameters: ")[2].split(", ")) - {"safety_filter", "own_clock"}
-        "safety_filter",
-        "own_clock",
-    }
     scenario = with_policy_requirements(name, load_scenario("tracking"))
     with pytest.raises(PolicyError, match="has no parameter") as error:
         make_policy(f"{name},nothing=1", scenario)

@@ -77,7 +77,7 @@ def test_without_the_channel_nothing_is_added_and_nothing_changes():
 
 def test_a_channel_that_the_task_lacks_is_refused_with_the_remedy():
     message = (
-        "sonar.channels can't hold 'path' with task 'follow', whose channels are compass, .*, modem; "
+        "sonar.channels can't hold 'path' with task 'follow', whose channels are compass, .*, episode; "
         "task 'hard_water' has it"
     )
     for refused in (
@@ -102,7 +102,7 @@ def test_geodesic_progress_is_what_the_way_has_shortened_by():
     for _ in range(20):
         result, usual = (env.step(np.full((4, 10, 2), 0.6)) for env in (knowing, dense))
         total += result.terms["progress"]
-        for term in ("obstacle", "spacing", "effort", "collision", "arrival"):
+        for term in ("obstacle", "spacing", "effort", "collision", "stay"):
             np.testing.assert_array_equal(result.terms[term], usual.terms[term])
     np.testing.assert_allclose(total, (before - knowing.task.path_lengths()) / plain.reward.progress_m, atol=1e-9)
     with pytest.raises(ValueError, match="choose one of task 'follow'"):

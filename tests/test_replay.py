@@ -202,7 +202,7 @@ def test_the_command_shows_policies_side_by_side(tmp_path, monkeypatch, written)
     ((recordings, path, _),) = written
     assert [(recording.policy, recording.seed) for recording in recordings] == [("idle", 3), ("sdc", 3)]
     assert [list(recording.inspections) for recording in recordings] == [[2], [2]]
-    assert recordings[1].scenario.sonar.channels == ("compass", "link")
+    assert recordings[1].scenario.sonar.channels == ("compass", "link", "identity")
     assert re.fullmatch(r"single_obstacle\.idle-sdc\.3\.[0-9a-f]{8}\.html", path.name)
     assert path.parent == Path("results/replay")
     assert f"Replay: {path}" in text

@@ -54,7 +54,7 @@ def command(*arguments, output="results/benchmark"):
         (lambda data: data["runs"][0].update(seed="0"), "runs.0.seed"),
         (lambda data: data["versions"].update(numpy="0.0.1"), r"comes from numpy 0\.0\.1, and here is"),
         (lambda data: data["versions"].update(uuv_marl="0.0.1"), r"comes from uuv_marl 0\.0\.1, and here is"),
-        (lambda data: data.update(fingerprint="0"), "other code"),
+        (lambda data: data.update(fingerprint="0"), "code 0, and here is"),
     ],
 )
 def test_a_file_that_lacks_something_or_comes_from_elsewhere_is_refused_by_its_name(tmp_path, change, message):

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import uuv_marl
 from tests.swarms import started
 from uuv_marl import load_scenario
+from uuv_marl.envs.state import state_layout
 from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
@@ -140,7 +141,8 @@ def test_interfaces_agree_and_the_global_state_has_the_velocity():
         seen, *_ = parallel.step({agent: np.array([0.3, 0.0], np.float32) for agent in parallel.agents})
         both, *_ = vector.step(np.full((2, N, 2), [0.3, 0.0], np.float32).reshape(vector.action_space.shape))
     np.testing.assert_array_equal(np.stack(list(seen.values())), np.reshape(both, (2, N, -1))[1])
-    velocity = parallel.state()[-8:].reshape(4, 2)
+    start = state_layout(made).starts["obstacle_velocity"]
+    velocity = parallel.state()[start : start + 8].reshape(4, 2)
     world_map = parallel.swarm.world_map
     np.testing.assert_array_equal(velocity, (world_map.obstacle_velocity[0] / 4.0).astype(np.float32))
     assert len(parallel.state()) == 8 + len(uuv_marl.parallel_env(scenario("multi_obstacle", 0.0)).state_space.low)

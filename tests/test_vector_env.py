@@ -261,7 +261,7 @@ def test_solo_drops_no_argument_and_takes_the_modem_for_the_link():
     with pytest.raises(TypeError, match="others must be the name of a policy, or module:Class, got None"):
         SoloEnv(STARTER, None)
     both = SoloEnv("starter", "sdc", overrides={"sonar.channels": ["link", "modem"]})
-    assert both.scenario.sonar.channels == ("compass", "modem")
+    assert both.scenario.sonar.channels == ("compass", "modem", "identity")
 
 
 def test_solo_takes_actions_that_can_t_be_written_to(monkeypatch):

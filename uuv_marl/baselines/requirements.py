@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import NamedTuple
 
 from uuv_marl.errors import PolicyError
@@ -24,7 +23,7 @@ class PolicyRequirements(NamedTuple):
     """Full torque of the vehicle for which the policy states ``yaw_damping_nms`` [N m]."""
     decision_period_s: float | None = None
     """Decision period [s]; None if the policy works with any."""
-    channels_if: Mapping[str, Sequence[str]] = MappingProxyType({})
+    channels_if: Mapping[str, Sequence[str]] = {}
     """Further channels by the name of a parameter that requires them where it is true."""
     outputs_force: bool = False
     """Whether ``decide`` returns desired forces. For a vehicle with a rudder they are then turned into thrust and

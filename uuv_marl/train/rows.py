@@ -62,7 +62,7 @@ class Group:
         self.env = BatchedEnv(scenario, part.worlds, reward, observe="closeness", keep_terms=False)
         self._network_action = ExternalActionPolicy(scenario, part.worlds, card)
         self._acting = compose(self._network_action, card)
-        self._shape, self._state = (part.worlds, part.vehicles), training.critic == "state"
+        self._shape, self._state = (part.worlds, part.vehicles), training.critic == "pooled"
         self.collision_cost = 0.0
         """Cost of a collision beyond the reward."""
         try:
@@ -148,7 +148,7 @@ class Rows:
         """Index of the part of the training to which each row belongs, shape (row,)."""
         self.rows: int = ends[-1]
         self.features = self.groups[0].env.layout.size
-        self.size = self.features + PRIVILEGED_SIZE * (training.critic == "state")
+        self.size = self.features + PRIVILEGED_SIZE * (training.critic == "pooled")
         self.observation = np.zeros((self.rows, self.size), np.float32)
         for group, rows in zip(self.groups, self._rows, strict=True):
             worlds = [*range(group.env.swarm.num_worlds)]

@@ -110,9 +110,9 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     reward: str | None = None
     """One of the task's rewards, ``team``, or your own ``module:function`` from the swarm after a decision to an array
     (world, vehicle). The task's first if None, and in scenarios whose task does not have it."""
-    critic: Literal["state", "own"] = "state"
-    """Input of the critic beyond the vehicle's observation: ``state``, the true state of the world (MAPPO); ``own``,
-    nothing (IPPO)."""
+    critic: Literal["pooled", "own"] = "pooled"
+    """Input of the critic beyond the vehicle's observation: ``pooled``, means and extremes over the true state of the
+    world (MAPPO); ``own``, nothing (IPPO)."""
     network: Architecture = Architecture()
     """Architecture of the policy's network."""
     filter: bool = False
