@@ -150,7 +150,7 @@ def solo(name, scenario, seed, decisions, rng):
     """Gymnasium's one learner, which acts as all others do."""
     records = []
     for w in range(WORLDS):
-        env = gymnasium.make("uuv_marl/Solo-v1", scenario=scenario, others=name, max_cycles=CYCLES)
+        env = gymnasium.make("uuv_marl/Solo-v2", scenario=scenario, others=name, max_cycles=CYCLES)
         policy, record = make_policy(name, env), []
         observation, _ = env.reset(seed=seed + w)
         while len(record) < decisions:

@@ -9,7 +9,7 @@ import pytest
 
 import uuv_marl
 from tests.contract import ARRIVES, SINKS
-from uuv_marl import load_scenario, uuv_swarm_v1
+from uuv_marl import load_scenario, uuv_swarm_v2
 from uuv_marl.baselines import make_policy
 from uuv_marl.percept import Percept
 
@@ -38,7 +38,7 @@ def test_parallel_seed(scenario_name):
 
 
 def test_max_cycles():
-    max_cycles_test(uuv_swarm_v1)
+    max_cycles_test(uuv_swarm_v2)
 
 
 def test_state(scenario_name):
@@ -157,7 +157,7 @@ def test_what_is_no_action_is_refused_by_name(action, message):
     with pytest.raises(ValueError, match=f"the action of uuv_1 {message}"):
         env.step({**good, "uuv_1": action})
     assert env.swarm.facts.time_s[0] == 0.0
-    alone = gymnasium.make("uuv_marl/Solo-v1", num_vehicles=3).unwrapped
+    alone = gymnasium.make("uuv_marl/Solo-v2", num_vehicles=3).unwrapped
     alone.reset(seed=0)
     with pytest.raises(ValueError, match=f"the action {message}"):
         alone.step(action)
@@ -193,7 +193,7 @@ ENDINGS = {
 def test_the_last_info_tells_how_it_ended(reason):
     scenario = load_scenario("lossy", num_vehicles=4, overrides={**ENDINGS[reason], "timing.decision_period_s": 0.5})
     env, whole = uuv_marl.parallel_env(scenario), uuv_marl.vector_env(1, scenario)
-    solo = gymnasium.make("uuv_marl/Solo-v1", scenario=scenario, others="bio_inspired").unwrapped
+    solo = gymnasium.make("uuv_marl/Solo-v2", scenario=scenario, others="bio_inspired").unwrapped
     policy = make_policy("bio_inspired", env)
     observations, _ = env.reset(seed=4)
     whole.reset(seed=4)

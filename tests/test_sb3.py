@@ -119,11 +119,11 @@ def test_time_limits_are_bootstrapped_and_arrivals_are_not(monkeypatch):
 
 @pytest.mark.parametrize("others", ["bio_inspired", "sdc"])
 def test_solo_passes_sb3s_check(scenario_name, others):
-    check_env(gymnasium.make("uuv_marl/Solo-v1", scenario=scenario_name, num_vehicles=8, others=others))
+    check_env(gymnasium.make("uuv_marl/Solo-v2", scenario=scenario_name, num_vehicles=8, others=others))
 
 
 def test_sac_learns_on_solo():
-    env = gymnasium.make("uuv_marl/Solo-v1", num_vehicles=4, decision_period=0.5, overrides=SHORT)
+    env = gymnasium.make("uuv_marl/Solo-v2", num_vehicles=4, decision_period=0.5, overrides=SHORT)
     model = SAC("MlpPolicy", env, learning_starts=40, batch_size=32, seed=1, device="cpu")
     before = weights(model)
     model.learn(120)
@@ -133,7 +133,7 @@ def test_sac_learns_on_solo():
 
 
 def test_a_monitor_finds_its_keys_where_a_wrapper_ends_the_episode():
-    env = gymnasium.make("uuv_marl/Solo-v1", scenario="starter", max_episode_steps=5)
+    env = gymnasium.make("uuv_marl/Solo-v2", scenario="starter", max_episode_steps=5)
     env = Monitor(env, info_keywords=("is_success", "ending", "arrived", "time_s", "collisions"))
     told = env.reset(seed=0)[1]
     assert told["ending"] == "running"

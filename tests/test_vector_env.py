@@ -187,18 +187,18 @@ def test_what_cannot_be_done_is_named():
 
 
 def test_registries():
-    made = gymnasium.make_vec("uuv_marl/Swarm-v1", num_envs=2, scenario="tracking", num_vehicles=3)
+    made = gymnasium.make_vec("uuv_marl/Swarm-v2", num_envs=2, scenario="tracking", num_vehicles=3)
     assert made.observation_space.shape == (2, 3, 98)
-    assert made.spec.id == "uuv_marl/Swarm-v1"
-    solo = gymnasium.make("uuv_marl/Solo-v1", num_vehicles=3)
+    assert made.spec.id == "uuv_marl/Swarm-v2"
+    solo = gymnasium.make("uuv_marl/Solo-v2", num_vehicles=3)
     assert solo.observation_space.shape == (98,)
-    parallel = pettingzoo.make("parallel", "uuv_marl/uuv_swarm_v1", num_vehicles=3, max_cycles=7)
+    parallel = pettingzoo.make("parallel", "uuv_marl/uuv_swarm_v2", num_vehicles=3, max_cycles=7)
     assert parallel.max_cycles == 7
-    assert pettingzoo.make("aec", "uuv_marl/uuv_swarm_v1", num_vehicles=3).max_num_agents == 3
+    assert pettingzoo.make("aec", "uuv_marl/uuv_swarm_v2", num_vehicles=3).max_num_agents == 3
 
 
 def solo(others="bio_inspired", **kwargs):
-    return gymnasium.make("uuv_marl/Solo-v1", others=others, **{"num_vehicles": 6, **kwargs})
+    return gymnasium.make("uuv_marl/Solo-v2", others=others, **{"num_vehicles": 6, **kwargs})
 
 
 def test_solo_passes_gymnasiums_check(scenario_name):
@@ -351,12 +351,12 @@ def test_numbers_below_float32s_range_are_zero_whatever_numpy_is_told(action):
 
 def test_a_spec_with_a_scenario_goes_through_json():
     scenario = uuv_marl.load_scenario("starter", overrides={"current.speed_mps": 0.5})
-    one = gymnasium.make("uuv_marl/Solo-v1", scenario=scenario, max_episode_steps=5)
+    one = gymnasium.make("uuv_marl/Solo-v2", scenario=scenario, max_episode_steps=5)
     again = gymnasium.make(EnvSpec.from_json(one.spec.to_json()))
     assert again.unwrapped.scenario == one.unwrapped.scenario
     assert again.spec.max_episode_steps == 5
     mode, three = AutoresetMode.NEXT_STEP, np.int64(3)
-    many = gymnasium.make_vec("uuv_marl/Swarm-v1", 2, scenario=scenario, autoreset_mode=mode, max_cycles=three)
+    many = gymnasium.make_vec("uuv_marl/Swarm-v2", 2, scenario=scenario, autoreset_mode=mode, max_cycles=three)
     again = gymnasium.make_vec(EnvSpec.from_json(many.spec.to_json()))
     assert (again.scenario, again.metadata["autoreset_mode"]) == (scenario, mode)
     with pytest.raises(ScenarioError, match="swarm.num_vehicles must be a valid integer, got 'x'"):

@@ -14,7 +14,7 @@ def solo():
     here = multiprocessing.parent_process() is None
     forked = multiprocessing.get_start_method() == "fork"
     assert here or forked or "uuv_marl" not in sys.modules
-    return gymnasium.make("uuv_marl:uuv_marl/Solo-v1", scenario="starter", num_vehicles=3)
+    return gymnasium.make("uuv_marl:uuv_marl/Solo-v2", scenario="starter", num_vehicles=3)
 """
 
 

@@ -9,7 +9,7 @@ from research.dynamics import acceptance
 from research.episodes import measured, read_rows, select
 from research.heldout import page as heldout
 from research.tasks.studies import set_name
-from uuv_marl import load_scenario, scenario_names, uuv_swarm_v1
+from uuv_marl import load_scenario, scenario_names, uuv_swarm_v2
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.state import state_table
 from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
@@ -138,7 +138,7 @@ TABLES = filled() | {
     "stability": rows(acceptance.stability()),
     "heldout": HELD[0].rstrip("\n"),
     "fields": HELD[1].rstrip("\n"),
-    "history": table(("version", "what changed"), list(uuv_swarm_v1.HISTORY.items())),
+    "history": table(("version", "what changed"), list(uuv_swarm_v2.HISTORY.items())),
 }
 """The tables by the names of their marks."""
 

@@ -2,8 +2,8 @@
 
 ``parallel_env()``, ``env()`` and ``vector_env(num_envs)`` make environments, ``make_policy(name, env)`` a controller,
 ``evaluate(name, scenario)`` its metrics, ``load_scenario(name)`` a configuration. ``uuv-marl --help`` shows the command
-line. Importing registers ``uuv_marl/Swarm-v1`` and ``uuv_marl/Solo-v1`` with Gymnasium, and ``uuv_marl/uuv_swarm_v1``
-with PettingZoo; ``gymnasium.make("uuv_marl:uuv_marl/Solo-v1")`` imports the package itself, also in worker processes.
+line. Importing registers ``uuv_marl/Swarm-v2`` and ``uuv_marl/Solo-v2`` with Gymnasium, and ``uuv_marl/uuv_swarm_v2``
+with PettingZoo; ``gymnasium.make("uuv_marl:uuv_marl/Solo-v2")`` imports the package itself, also in worker processes.
 """
 
 import importlib
@@ -14,7 +14,7 @@ from uuv_marl.envs import registration
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from uuv_marl import baselines, uuv_swarm_v1
+    from uuv_marl import baselines, uuv_swarm_v2
     from uuv_marl.baselines import make_policy, with_policy_requirements
     from uuv_marl.benchmark.evaluate import evaluate
     from uuv_marl.envs.parallel_env import env, parallel_env
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "__version__", "baselines", "env", "evaluate", "load_scenario", "make_policy", "parallel_env", "scenario_names",
-    "uuv_swarm_v1", "vector_env", "with_policy_requirements",
+    "uuv_swarm_v2", "vector_env", "with_policy_requirements",
 ]  # fmt: skip
 
 _HOMES = {
@@ -40,7 +40,7 @@ def __getattr__(name: str) -> Any:
     for module, names in _HOMES.items():
         if name in names:
             return getattr(importlib.import_module(module), name)
-    if name in ("baselines", "uuv_swarm_v1"):
+    if name in ("baselines", "uuv_swarm_v2"):
         return importlib.import_module(f"uuv_marl.{name}")
     raise AttributeError(f"module 'uuv_marl' has no attribute {name!r}")
 

@@ -238,7 +238,7 @@ def actions(rng, folder):
     else:
         import gymnasium
 
-        env = gymnasium.make("uuv_marl/Solo-v1", scenario="starter", num_vehicles=n, disable_env_checker=True).unwrapped
+        env = gymnasium.make("uuv_marl/Solo-v2", scenario="starter", num_vehicles=n, disable_env_checker=True).unwrapped
         env.reset(seed=0)
         observation, reward, *_ = env.step(given[0] if isinstance(given, np.ndarray) and given.size > 1 else given)
         finite(observation, reward)

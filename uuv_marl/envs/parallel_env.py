@@ -33,7 +33,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo's own form
-        "name": "uuv_swarm_v1",
+        "name": "uuv_swarm_v2",
         "render_modes": ["human", "rgb_array"],
         "is_parallelizable": True,
     }

@@ -16,7 +16,7 @@ with extra("distributed", "SwarmMultiAgentEnv"):
     from ray.tune.registry import register_env  # pyright: ignore[reportMissingImports]
 
 
-ENV_NAME = "uuv_swarm_v1"
+ENV_NAME = "uuv_swarm_v2"
 """The name that ``register`` uses."""
 
 

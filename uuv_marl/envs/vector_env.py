@@ -40,7 +40,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium's own form
-        "name": "uuv_swarm_v1",
+        "name": "uuv_swarm_v2",
         "autoreset_mode": AutoresetMode.SAME_STEP,
         "render_modes": ["rgb_array"],
     }

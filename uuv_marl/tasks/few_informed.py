@@ -44,8 +44,9 @@ class FewInformed(Reach):
         PerceptField("informed", (1,), FLAG, "1 if the vehicle perceives l(t); 0 if its reference always reads 0"),
     )
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "dense": {**Reach.rewards["dense"], **_OWN}, "leader": {**Reach.rewards["first_arrival"], **_OWN}
-    }  # fmt: skip
+        **{name: {**terms, **_OWN} for name, terms in Reach.rewards.items()},
+        "leader": {**Reach.rewards["first_arrival"], **_OWN},
+    }
     headline: ClassVar[str] = "uninformed_share"
     columns: ClassVar[Mapping[str, str]] = {"uninformed_share": "share of the uninformed vehicles that succeed [1]"}
     reference_policy: ClassVar[str] = "leader_follower"
