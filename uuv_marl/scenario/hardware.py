@@ -182,7 +182,7 @@ class Sonar(Section):
     """Observations beyond the percept: ``compass`` (heading), ``identity`` (a number of the vehicle's own), ``link``
     (neighbours' true identity and velocity), ``modem`` (the same from their latest messages), ``current`` (own velocity
     over ground and through the water), ``age`` (of each sub-sector's reading), ``ranged`` (whether its range was
-    measured), ``episode`` (whether the reward for arriving was paid, and the time left), and those of the task."""
+    measured), ``episode`` (whether it has had its reward for arriving, and the time left), and those of the task."""
     arrays: Annotated[tuple[SonarArray, ...], Field(min_length=1)]
     """The arrays, in the order of sub-sectors in the percept."""
 

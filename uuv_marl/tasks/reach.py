@@ -43,8 +43,8 @@ class Reach(Task):
     """Be within ``near_m`` of a goal at rest; the episode ends when all living vehicles are.
 
     The weights are those of ``follow``. Progress sums to the reduction of the distance; no term depends on the number
-    of vehicles. ``dense`` pays for staying at the goal, which the observation shows; ``first_arrival`` pays once, so
-    that its return depends on whether that was before: a policy without memory then learns to leave.
+    of vehicles. ``dense`` rewards staying at the goal, which the observation shows; ``first_arrival`` rewards the first
+    arrival alone, so that a value depends on whether it has been: a policy without memory learns to leave again.
     """
 
     Numbers = ReachNumbers
@@ -83,19 +83,19 @@ class Reach(Task):
         now, before = (np.minimum(left, far) for left in self.remaining_m())
         left_s = np.maximum(self.swarm.time_limit_s - facts.time_s, 0.0)[:, None]
         worst = weight.collision + weight.arrival + (weight.obstacle + weight.spacing + weight.effort) * left_s
-        paid = {"stay": self._stay, "arrival": self._arrival}
+        goal = {"stay": self._stay, "arrival": self._arrival}
         return {
             "obstacle": -weight.obstacle * dt * np.clip(1.0 - facts.clearance / limits.s_o_m, 0.0, 1.0),
             "spacing": -weight.spacing * dt * np.clip(1.0 - facts.spacing / limits.s_u_m, 0.0, 1.0),
             "effort": -weight.effort * dt * facts.effort,
             "collision": -weight.collision * facts.vehicle_collisions,
             "loss": np.where(facts.lost, -1.0, 0.0) * (worst + (far - now) / weight.progress_m),
-            **{name: weight.arrival * share() for name, share in paid.items() if name in self.terms},
+            **{name: weight.arrival * share() for name, share in goal.items() if name in self.terms},
             "progress": (before - now) / weight.progress_m,
         }
 
     def _stay(self) -> Float64:
-        """Shares of the time limit that are paid for, shape (world, vehicle)."""
+        """Shares of the time limit that are rewarded, shape (world, vehicle)."""
         swarm, period = self.swarm, self.swarm.scenario.timing.decision_period_s
         left_s = swarm.time_limit_s - swarm.facts.time_s
         share = np.where(self.done(), left_s + period, period) / swarm.time_limit_s
