@@ -36,10 +36,7 @@ MEDIUM = {
     "sonar.echo_reports": "surface", "arrival.ends_episode": False,
 }  # fmt: skip
 """Everything that can disturb a world, in the middle of its range."""
-SEA = MEDIUM | {
-    "sonar.channels": ["compass", "current", "age", "ranged", "modem"],
-    "modem.loss_probability": 0.1,
-}
+SEA = MEDIUM | {"sonar.channels": ["compass", "current", "age", "ranged", "modem"], "modem.loss_probability": 0.1}
 """The same, and all that vehicles can be told of it."""
 SINKING = {"faults": [{"kind": "member", "share": 0.4, "onset_s": 2.0}]}
 BRIEF = {"time_limit.factor": 0.005, "time_limit.extra_s": 4.0}
