@@ -18,9 +18,6 @@ from uuv_marl.scenario.turning import turning_radius
 SLOW = {"trajectory.speed_mps": 1.0, "start.speed_max_mps": 1.0, "timing.integration_step_s": 0.0125}
 
 
-# --- Against the sources ---
-
-
 @pytest.fixture(scope="module")
 def measured():
     return {
@@ -49,9 +46,6 @@ def test_the_turning_radius_is_that_of_the_acceptance_test(name):
     alone = handling.alone(name)
     radius = turning_radius(alone.vehicle, alone.actuators, alone.vehicle.cruise_mps)
     assert radius == pytest.approx(handling.turn(alone)[2], rel=0.02)
-
-
-# --- Against SciPy, the sources' equations written anew ---
 
 
 class Lauv:
@@ -120,9 +114,6 @@ def test_a_minute_of_a_steady_turn_is_scipys(name, source):
     assert math.remainder(swarm.state.eta[0, 0, 2] - psi, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-7)
     np.testing.assert_allclose(swarm.state.nu[0, 0], nu, atol=1e-7)
     assert psi > 2.0 * math.pi, "to starboard, more than a full circle"
-
-
-# --- The files ---
 
 
 @pytest.mark.parametrize("name", handling.every())
