@@ -36,10 +36,7 @@ MEDIUM = {
     "sonar.echo_reports": "surface", "arrival.ends_episode": False,
 }  # fmt: skip
 """Everything that can disturb a world, in the middle of its range."""
-SEA = MEDIUM | {
-    "sonar.channels": ["compass", "current", "age", "ranged", "modem"],
-    "modem.loss_probability": 0.1,
-}
+SEA = MEDIUM | {"sonar.channels": ["compass", "current", "age", "ranged", "modem"], "modem.loss_probability": 0.1}
 """The same, and all that vehicles can be told of it."""
 SINKING = {"faults": [{"kind": "member", "share": 0.4, "onset_s": 2.0}]}
 BRIEF = {"time_limit.factor": 0.005, "time_limit.extra_s": 4.0}
@@ -110,16 +107,10 @@ def own_reward(swarm):
 
 def empty(steps, size, reward=np.float64, state=0):
     shape = (steps, WORLDS, VEHICLES)
-    return Run(
-        np.zeros((steps + 1, *shape[1:], size), np.float32),
-        np.zeros((*shape, size), np.float32),
-        np.zeros(shape, reward),
-        np.zeros(shape, bool),
-        np.zeros(shape, bool),
-        np.zeros(shape[:2], bool),
-        np.zeros((steps + 1, *shape[1:]), bool),
-        np.zeros((steps + 1, WORLDS, state), np.float32),
-    )
+    observations = np.zeros((steps + 1, *shape[1:], size), np.float32), np.zeros((*shape, size), np.float32)
+    terminated, truncated, over = (np.zeros(form, bool) for form in (shape, shape, shape[:2]))
+    mask, states = np.zeros((steps + 1, *shape[1:]), bool), np.zeros((steps + 1, WORLDS, state), np.float32)
+    return Run(*observations, np.zeros(shape, reward), terminated, truncated, over, mask, states)
 
 
 def cases():

@@ -112,9 +112,6 @@ def made(section: str) -> dict[str, Any]:
     return fields() if section == FIELDS else dict(runs(section)) if section in SETTINGS else {}
 
 
-# --- Runs ---
-
-
 def runs(name: str) -> Iterator[tuple[str, Any]]:
     """Keys and values of a setting's runs."""
     setting = SETTINGS[name]
@@ -176,9 +173,6 @@ def sample(scenario: Scenario, policy: str, decisions: int) -> list[float]:
     return shown
 
 
-# --- Fields ---
-
-
 def fields() -> dict[str, Any]:
     """Every field of the shipped scenarios: its value by scenario, or one value where all agree."""
     values: dict[str, dict[str, Any]] = {}
@@ -203,9 +197,6 @@ def leaves(data: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
             yield from leaves(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
-
-
-# --- Comparison ---
 
 
 def differences(then: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:

@@ -54,9 +54,6 @@ def swim(overrides, decisions=40, worlds=1, seed=3, scenario=STARTER, **change):
     return swarm
 
 
-# --- Without disturbances ---
-
-
 @pytest.mark.parametrize("channel", DISTURBANCE_CHANNELS)
 def test_the_code_of_disturbances_with_all_of_them_off_changes_no_bit(channel):
     for worlds in (1, 3):
@@ -108,9 +105,6 @@ def test_a_reset_leaves_nothing_of_the_previous_episode():
     for name, array in used.snapshot().items():
         if name != "streams":
             np.testing.assert_array_equal(array[1], new.snapshot()[name][1], name)
-
-
-# --- Currents ---
 
 
 def test_a_uniform_current_carries_the_same_motion_along():
@@ -229,9 +223,6 @@ def test_the_water_at_a_vehicle_is_the_field_there():
     assert not Swarm(load_scenario(STARTER)).flow_field().at([[[1.0, 2.0]]]).any()
     with pytest.raises(ValueError, match=r"north and east \[m\], shape \(..., 2\), got shape \(3,\)"):
         swarm.flow_field().at([1.0, 2.0, 3.0])
-
-
-# --- Forces ---
 
 
 @given(st.floats(-300, 0.01), st.floats(0, 50))

@@ -33,9 +33,6 @@ def carried(decisions=30):
     return swarms
 
 
-# --- Velocities over ground ---
-
-
 def test_traces_and_recordings_hold_the_velocity_over_ground():
     """Vehicles that do nothing end up with the water, at rest relative to it."""
     scenario = load_scenario(STARTER, overrides=CURRENT)
@@ -56,8 +53,6 @@ def test_the_global_state_holds_the_velocity_over_ground():
     np.testing.assert_allclose(fields[1]["velocity"] - fields[0]["velocity"], flow, atol=1e-5)
     np.testing.assert_array_equal(fields[1]["yaw_rate"], fields[0]["yaw_rate"])
 
-
-# --- Replays and headers ---
 
 WATER = CURRENT | {"current.variation_mps": 0.3, "current.eddies": 8, "current.eddy_speed_mps": 1.2}
 SHORT = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0}

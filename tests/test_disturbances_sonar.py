@@ -99,9 +99,6 @@ def same(ours, theirs, names=SONAR, where=np.s_[:]):
         assert ours[name][where].tobytes() == theirs[name][where].tobytes(), name
 
 
-# --- Without disturbances ---
-
-
 def test_readings_without_delay_and_error_change_no_bit():
     """A delay line of true values: a period of one control step, and outages that never begin."""
     _, calm = swim({})
@@ -109,9 +106,6 @@ def test_readings_without_delay_and_error_change_no_bit():
         assert not sonar_is_ideal(load_scenario("starter", overrides=overrides))
         for ours, theirs in zip(swim(overrides)[1], calm, strict=True):
             same(ours, theirs, names=ours)
-
-
-# --- Latency ---
 
 
 @pytest.mark.parametrize(("every", "delay", "holds"), [*itertools.product([1.0, 2.5, 7.0], [0, 1, 3, 20], [1, 5])])
@@ -194,9 +188,6 @@ def test_sound_shows_vehicles_where_they_were():
     _, ideal = swim({})
     same(frames[-1], ideal[-1], ("detected", "echo", "echo_range", "echo_position", "who"))
     assert np.abs(frames[-1]["neighbour"] - ideal[-1]["neighbour"]).max() > 0.5
-
-
-# --- Errors ---
 
 
 def polar(points):
@@ -378,9 +369,6 @@ def test_an_array_with_a_fault_detects_nothing():
                 same(ours, theirs, where=np.s_[i])
 
 
-# --- Random numbers ---
-
-
 @pytest.mark.parametrize(
     "other", [DETECTION, SILENCE, DRIFT, COMPASS, DEAD, {"current.variation_mps": 0.0, "current.velocity": "water"}]
 )
@@ -398,9 +386,6 @@ def test_one_disturbance_changes_no_error_of_bearings_and_ranges(other):
 def test_one_disturbance_changes_no_missed_detection(own, other):
     for ours, theirs in zip(swim(own)[1], swim(own | other)[1], strict=True):
         same(ours, theirs, ("detected", "echo", "who"))
-
-
-# --- Navigation ---
 
 
 def drift_of(frame):
@@ -448,9 +433,6 @@ def test_drift_displaces_compensated_readings():
         drift = (drift_of(frames[t]) - drift_of(frames[t - 5]))[i]
         off = frames[t]["neighbour"].astype(float)[i, k] - true[t]["neighbour"][i, k]
         np.testing.assert_allclose(off, -turned(*drift.T, frames[t]["eta"][i, 2]), atol=2e-3)
-
-
-# --- Everything ---
 
 
 HARSH = {

@@ -101,6 +101,10 @@ def test_a_notebook_has_the_cells_of_its_source_and_one_that_installs(source):
     assert path.stat().st_size < 300_000
 
 
+CONSOLE = "\n".join(param.values[0] for param in blocks("console")).splitlines()
+COMMANDS = {line.split("#")[0].strip() for line in CONSOLE if "uuv-marl" in line or "-m research." in line}
+
+
 def stop(*args, **kwargs):
     raise KeyboardInterrupt
 
@@ -109,17 +113,7 @@ def stop_at_once(*args, **kwargs):
     yield from iter(stop, None)
 
 
-@pytest.mark.parametrize(
-    "line",
-    sorted(
-        {
-            line.split("#")[0].strip()
-            for param in blocks("console")
-            for line in param.values[0].splitlines()
-            if "uuv-marl" in line or "-m research." in line
-        }
-    ),
-)
+@pytest.mark.parametrize("line", sorted(COMMANDS))
 def test_commands_are_understood(line, monkeypatch, tmp_path):
     """Parsed as written, options and names checked, then stopped before the long work."""
     for work in (

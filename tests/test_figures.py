@@ -28,8 +28,6 @@ def test_the_style_is_left_behind_and_the_same_picture_is_the_same_file(tmp_path
         assert tuple(mpl.rcParams["axes.prop_cycle"].by_key()["color"]) == style.COLOURS
 
 
-COMMANDS = (["benchmark", "--scenario=starter", "--seeds=1", "--policy=idle"], ["robustness", "--scenario=starter"],
-            ["train", "starter", "--steps=1000"], ["replay", "--scenario=starter", "--output=film.png"])  # fmt: skip
 MODULES = ("benchmark.figures", "benchmark.robustness.figure", "benchmark.style", "envs.drawing.ink", "train.curve")
 
 
@@ -42,9 +40,8 @@ def test_a_backend_that_is_none_is_named_in_one_line_before_the_work(tmp_path):
 import importlib
 from typer.testing import CliRunner
 from uuv_marl.cli import app
-for arguments in {COMMANDS}:
-    done = CliRunner().invoke(app, arguments)
-    print(done.exit_code, done.output.strip())
+done = CliRunner().invoke(app, ["benchmark", "--scenario=starter", "--seeds=1", "--policy=idle"])
+print(done.exit_code, done.output.strip())
 for module in {MODULES}:
     try:
         importlib.import_module(f"uuv_marl.{{module}}")
@@ -55,5 +52,5 @@ for module in {MODULES}:
     python = [sys.executable, "-c", code]
     done = subprocess.run(python, check=False, cwd=tmp_path, env=told, capture_output=True, text=True)
     line = "2 Error: MPLBACKEND must be a backend of Matplotlib, got 'nonsense'; unset it, or set it to agg"
-    assert done.stdout.splitlines() == [line] * len(COMMANDS + MODULES), done.stderr
+    assert done.stdout.splitlines() == [line] * (1 + len(MODULES)), done.stderr
     assert not list(tmp_path.iterdir())

@@ -57,8 +57,6 @@ print(json.dumps([bits, actions]))
     np.testing.assert_allclose(slow_actions, actions, rtol=0, atol=1e-4)
 
 
-# --- Motion ---
-
 ASTERN = {"actuators.max_astern_n": 700.0, "vehicle.munk_moment": False}
 HELD = {"timing.decision_period_s": 0.5}
 FINE = {**HELD, "timing.integration_step_s": 0.02}
@@ -114,18 +112,12 @@ def test_an_action_of_any_size_is_projected_onto_the_unit_disc(size):
     np.testing.assert_allclose(swarm.facts.effort, 1.0, rtol=1e-15)
 
 
-# --- Sine and cosine ---
-
-
 def test_rotated_points_are_rounded_twice_as_a_fused_product_is():
     rng = np.random.default_rng(0)
     points, angles = rng.uniform(-300.0, 300.0, (200, 2)), rng.uniform(-np.pi, np.pi, 200)
     for (x, y), angle in zip(points.tolist(), angles.tolist(), strict=True):
         c, s = cos_sin(angle)
-        wanted = [
-            float(Fraction(y) * Fraction(-s) + Fraction(x * c)),
-            float(Fraction(y) * Fraction(c) + Fraction(x * s)),
-        ]
+        wanted = [float(Fraction(y) * Fraction(a) + Fraction(x * b)) for a, b in ((-s, c), (c, s))]
         assert rotated(np.array([x, y]), c, s).tolist() == wanted
     many = rotated(points, *cos_sin(0.7))
     np.testing.assert_array_equal(many, [rotated(point, *cos_sin(0.7)) for point in points])
@@ -147,9 +139,6 @@ def test_cos_sin_is_the_library_s_even_and_odd():
     assert cos_sin(0.0) == (1.0, 0.0)
     assert cos_sin(1e-200) == (1.0, 1e-200)
     assert all(map(math.isnan, cos_sin(math.nan)))
-
-
-# --- Neighbours, distances, collisions ---
 
 
 def array(name, mounting, aperture, sub_sectors, range_m, kind="passive"):
@@ -387,8 +376,6 @@ def test_the_largest_distance_is_found_whatever_the_shape(shape, n):
         swarm.observe()
         check(swarm)
 
-
-# --- Whole percepts, along an episode ---
 
 EPISODES = {
     "surfaces, all channels": (

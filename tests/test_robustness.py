@@ -23,9 +23,6 @@ def silent(what, share):
     pass
 
 
-# Axes
-
-
 def test_every_axis_is_whole():
     assert {axis.group for axis in AXES.values()} == set(GROUPS)
     for axis in AXES.values():
@@ -49,9 +46,6 @@ def test_every_level_is_a_scenario_of_its_own(scenario):
         assert loaded not in seen, (axis, level)
         assert disturbances(loaded) or AXES[axis].channels, (axis, level)
         seen.append(loaded)
-
-
-# Scores
 
 
 def table(policy="p", **cells):
@@ -85,9 +79,6 @@ def test_a_group_of_which_every_seed_misses_a_cell_has_no_score():
     half = table(calm=[1.0] * 6, W1_1=[1.0, np.nan] * 3, W1_3=[np.nan, 1.0] * 3)
     assert scores.group_score(half, AXES["W1"].group) is None
     assert scores.group_score(half, scores.EVERY) is None
-
-
-# Job, page, command
 
 
 TINY = job.Plan(("A1", "C1"), (1, 5), ("starter",), ("bio_inspired",), 1)

@@ -27,9 +27,6 @@ def with_vehicle(vehicle, num_vehicles=1, speed=1.5):
     )  # fmt: skip
 
 
-# --- The rudder ---
-
-
 def helm(scenario, force, u):
     """Thrust and rudder for a desired force, body frame, as shares of full thrust and torque."""
     layout = PerceptLayout.of(scenario)
@@ -87,9 +84,6 @@ def test_torpedoes_pass_an_obstacle_without_a_collision(name):
     assert collisions == 0
 
 
-# --- What is refused ---
-
-
 class Acts(Policy):
     def act(self, percept):
         return np.zeros((*percept.flat.shape[:2], 2), np.float32)
@@ -104,9 +98,6 @@ def test_bad_combinations_are_refused_with_the_remedy():
     needed = re.escape(f"a yaw damping of {inner_loop_nms(600.0, 3000.0, rov):g} N m s")
     with pytest.raises(PolicyError, match=f"scout needs {needed}"):
         make_policy("scout", rov)
-
-
-# --- Training ---
 
 
 @pytest.mark.parametrize(("vehicle", "damping"), [("literature_185", 600.0), ("bluerov2_heavy", 5.8), ("lauv", 0.0)])

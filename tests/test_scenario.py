@@ -1,8 +1,7 @@
 """Scenarios: sources, overrides, and errors that name the field, the value and the remedy."""
 
 import re
-from collections import UserDict
-from collections.abc import Sequence
+from collections import UserDict, UserList
 from fractions import Fraction
 from importlib import resources
 
@@ -349,23 +348,10 @@ def test_a_vehicle_of_one_s_own_takes_nothing_from_the_paper_s(tmp_path):
     assert load_scenario(path).vehicle == own.vehicle
 
 
-class Listed(Sequence):
-    """As lists of configuration libraries are: no list."""
-
-    def __init__(self, *values):
-        self.values = values
-
-    def __getitem__(self, k):
-        return self.values[k]
-
-    def __len__(self):
-        return len(self.values)
-
-
 @pytest.mark.parametrize(
     ("field", "same", "given"),
     [
-        ("sonar.channels", ["compass"], Listed("compass")),
+        ("sonar.channels", ["compass"], UserList(["compass"])),
         ("sonar.channels", ["compass"], np.array(["compass"])),
         ("swarm.num_vehicles", 7, np.int64(7)),
         ("swarm.num_vehicles", 7, np.array(7)),
@@ -375,7 +361,7 @@ class Listed(Sequence):
         ("trajectory.speed_mps", 3.5, np.float32(3.5)),
         ("trajectory.speed_mps", 3.5, Fraction(7, 2)),
         ("obstacles", [{"centre_m": [1.0, 2.0], "radius_m": 3.0}],
-         Listed(UserDict(centre_m=np.array([1.0, 2.0]), radius_m=np.float64(3.0)))),
+         UserList([UserDict(centre_m=np.array([1.0, 2.0]), radius_m=np.float64(3.0))])),
     ],
 )  # fmt: skip
 def test_a_value_of_an_override_is_taken_for_what_it_can_do(field, same, given):

@@ -41,9 +41,6 @@ def discs(made, w=0):
     return made.world_map.obstacles[w, : made.world_map.num_obstacles[w]].copy()
 
 
-# --- Motion ---
-
-
 @settings(max_examples=15)
 @given(speed=st.floats(1.0, 20.0), way=st.floats(2.0, 12.0), seed=st.integers(0, 999))
 def test_an_obstacle_oscillates_at_its_speed_within_its_amplitude(speed, way, seed):
@@ -105,9 +102,6 @@ def test_off_is_as_if_there_were_no_such_section(off):
         np.testing.assert_array_equal(made.snapshot()[name], array, err_msg=name)
 
 
-# --- Echoes and collisions ---
-
-
 def test_a_hull_that_is_pushed_keeps_at_the_surface_and_is_left_behind():
     """At rest in the path of a disc, its stern towards it; the other vehicles are far."""
     made = swarm(**{"collision.stops": True})
@@ -129,9 +123,6 @@ def test_a_hull_that_is_pushed_keeps_at_the_surface_and_is_left_behind():
     assert clearance[-1] > 2.0
 
 
-# --- Determinism ---
-
-
 def test_interfaces_agree_and_the_global_state_has_the_velocity():
     made = scenario("multi_obstacle")
     parallel, vector = uuv_marl.parallel_env(made), uuv_marl.vector_env(2, made)
@@ -146,9 +137,6 @@ def test_interfaces_agree_and_the_global_state_has_the_velocity():
     world_map = parallel.swarm.world_map
     np.testing.assert_array_equal(velocity, (world_map.obstacle_velocity[0] / 4.0).astype(np.float32))
     assert len(parallel.state()) == 8 + len(uuv_marl.parallel_env(scenario("multi_obstacle", 0.0)).state_space.low)
-
-
-# --- Errors, headers and replays ---
 
 
 def test_headers_name_it_and_it_needs_no_disturbances():

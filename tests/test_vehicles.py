@@ -18,9 +18,6 @@ from uuv_marl.scenario.turning import turning_radius
 SLOW = {"trajectory.speed_mps": 1.0, "start.speed_max_mps": 1.0, "timing.integration_step_s": 0.0125}
 
 
-# --- Against the sources ---
-
-
 @pytest.fixture(scope="module")
 def measured():
     return {
@@ -51,9 +48,6 @@ def test_the_turning_radius_is_that_of_the_acceptance_test(name):
     assert radius == pytest.approx(handling.turn(alone)[2], rel=0.02)
 
 
-# --- Against SciPy, the sources' equations written anew ---
-
-
 class Lauv:
     """Da Silva et al. 2007: signs of the source, D and the lift as they stand there."""
 
@@ -82,11 +76,7 @@ class Remus:
     @staticmethod
     def damping(u, v, r):
         return np.array(
-            [
-                [-6.11 * abs(u), 0.0, 0.0],
-                [0.0, -1310.0 * abs(v), 0.632 * abs(r)],
-                [0.0, -3.18 * abs(v), -94.0 * abs(r)],
-            ]
+            [[-6.11 * abs(u), 0.0, 0.0], [0.0, -1310.0 * abs(v), 0.632 * abs(r)], [0.0, -3.18 * abs(v), -94.0 * abs(r)]]
         ) + u * np.array([[0.0, 0.0, 0.0], [0.0, -28.6, 6.15], [0.0, 10.57, -3.93]])
 
 
@@ -124,9 +114,6 @@ def test_a_minute_of_a_steady_turn_is_scipys(name, source):
     assert math.remainder(swarm.state.eta[0, 0, 2] - psi, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-7)
     np.testing.assert_allclose(swarm.state.nu[0, 0], nu, atol=1e-7)
     assert psi > 2.0 * math.pi, "to starboard, more than a full circle"
-
-
-# --- The files ---
 
 
 @pytest.mark.parametrize("name", handling.every())

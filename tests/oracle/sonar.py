@@ -27,9 +27,6 @@ def between(a, b):
     return away, np.where(np.eye(len(a), dtype=bool), np.inf, squared) if a is b else squared
 
 
-# --- Distances and contacts ---
-
-
 def vehicles(now, before, alive, hull):
     """Each vehicle's distance to the nearest other, the largest distance, and each one's contacts that begin."""
     there = alive[:, None] & alive & ~np.eye(len(now), dtype=bool)
@@ -44,9 +41,6 @@ def obstacles(now, before, alive, hull, discs):
     gap, was = (np.sqrt(between(places, discs)[1]) - discs[:, 2] for places in (now, before))
     gap[~alive] = np.inf
     return gap.min(axis=1, initial=np.inf), gap.min(axis=0, initial=np.inf), ((gap < hull) & (was >= hull)).sum(axis=1)
-
-
-# --- Sonar ---
 
 
 def sectors(arrays):
