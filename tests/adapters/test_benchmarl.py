@@ -67,7 +67,7 @@ def test_it_trains(tmp_path, algorithm, how):
 
 def test_the_centralised_critic_reads_the_state(tmp_path):
     running = experiment(tmp_path, SwarmTask.SINGLE_OBSTACLE.get_task(SMALL))
-    assert running.state_spec["state"].shape == (41,)
+    assert running.state_spec["state"].shape == (48,)
     assert running.observation_spec["uuv", "observation"].shape == (4, 98)
     assert running.max_steps == 14
     running.close()
