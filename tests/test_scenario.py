@@ -130,6 +130,8 @@ BAD = [
     ({"obstacles": [{"centre_m": [1e5, 1e5], "radius_m": 1.0}] * 2000}, "obstacles must have at most 1024 entries"),
     ({"vehicle.X_u": 0.0, "vehicle.X_uu": 0.0}, "vehicle.X_u and vehicle.X_uu must not both be 0"),
     ({"vehicle.N_r": 500.0, "vehicle.N_rr": 1000.0}, "timing.integration_step_s = 0.1 is too long .* use at most"),
+    ({"actuators.max_force_n": 86797.0, "vehicle.Y_vv": 44.6}, "max_force_n = 86797 .* use at most"),
+    (RUDDER | {"actuators.Y_uud": 3e4}, "max_force_n = 3000 and rudder_max_deg = 20; "),  # the trial's own finding
     ({"actuators.yaw_damping_nms": 2000.0}, "actuators.yaw_damping_nms = 2000 is unstable .* use less than 1600"),
     ({"vehicle.x_G_m": 1.0}, "not positive definite"),
     ({"vehicle.Y_r": 500.0}, "lets linear damping add energy"),
@@ -284,6 +286,31 @@ def test_what_is_refused_as_stiff_does_diverge(n_r, n_rr, diverges):
         angle = rng.uniform(0, 2 * np.pi)
         state = advance(state, (3000 * np.cos(angle), 3000 * np.sin(angle)), STILL, 0.1, p)
     assert (not np.isfinite(state).all() or max(map(abs, state[3:])) > 100) is diverges
+
+
+VEHICLE = ("m_kg", "I_z_kgm2", "X_udot_kg", "Y_vdot_kg", "N_rdot_kgm2", "X_u", "Y_v", "N_r", "X_uu", "Y_vv", "N_rr")
+
+
+def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
+    from uuv_marl.sim.vehicle import STILL, advance, plant
+
+    rng, base, accepted = np.random.default_rng(5), load_scenario(BASE), 0
+    for _ in range(30):
+        scale = dict(zip(VEHICLE, np.exp(rng.uniform(-2.3, 2.3, len(VEHICLE))), strict=True))
+        changes = {f"vehicle.{name}": getattr(base.vehicle, name) * float(k) for name, k in scale.items()}
+        force, torque = 3000.0 * np.exp(rng.uniform(-3.4, 3.4, 2))
+        changes |= {"actuators.max_force_n": float(force), "actuators.max_torque_nm": float(torque)}
+        try:
+            p = plant(load_scenario(base, overrides=changes))
+        except ScenarioError:
+            continue
+        accepted += 1
+        for hold in (1, 10, 100, 600):
+            state = (0.0, 0.0, 0.0, 4.0, 0.0, 0.0)
+            for angle in np.repeat(rng.uniform(0.0, 2 * np.pi, 600 // hold), hold):
+                state = advance(state, (force * np.cos(angle), torque * np.sin(angle)), STILL, 0.1, p)
+            assert np.isfinite(state).all(), changes
+    assert accepted > 5
 
 
 READ_TWO = "from uuv_marl import load_scenario; load_scenario('starter'); load_scenario('random_field')"

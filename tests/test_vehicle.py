@@ -118,7 +118,7 @@ def test_the_hull_is_directionally_unstable_above_the_speed_that_the_docs_state(
 
 
 @pytest.mark.parametrize("munk", [True, False])
-def test_the_turning_radius_has_the_engine_s_equations(munk):
+def test_the_trial_of_a_step_has_the_engine_s_equations(munk):
     scenario = load_scenario("tracking", overrides=COUPLED | LIFT | {"vehicle.munk_moment": munk})
     p = plant(scenario)
     for nu in np.random.default_rng(0).uniform(-5.0, 5.0, (50, 3)):

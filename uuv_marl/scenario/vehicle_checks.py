@@ -4,6 +4,7 @@ Every message names the field, its value and the remedy.
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from uuv_marl.scenario.sections import Timing
 from uuv_marl.types import Float64
 
 RK4_LIMIT = 2.78  # classical Runge-Kutta is stable on the negative real axis up to this product of rate and step
+TRIAL_STEPS, RUNS = 600, 128  # integration steps of a trial, a minute at the paper's step, and parallel runs
+RUNAWAY = 1e8  # speed [m/s, rad/s] beyond which a trial has diverged, never reached otherwise
 SAMPLED_LIMIT = 2.0  # a sampled damping loop diverges above this product of rate and control step
 
 
@@ -107,25 +110,81 @@ def _check_lift(p: Vehicle) -> None:
 
 
 def _check_step(p: Vehicle, limits: Actuators, timing: Timing, speed_mps: float) -> None:
-    """Raise ValueError for an integration step that is unstable at the damping rate of the highest speeds."""
-    h, rate = timing.integration_step_s, _damping_rate(p, limits, speed_mps)
-    if not rate * h < RK4_LIMIT:
-        step_s = timing.control_step_s / math.ceil(timing.control_step_s * rate / RK4_LIMIT)
-        raise ValueError(
-            f"timing.integration_step_s = {h:g} is too long for this vehicle, so that Runge-Kutta diverges; use at "
-            f"most {step_s:.3g}, or lower the actuators' limits, the vehicle's resistances or its added masses"
+    """Raise ValueError for an integration step too long for the fastest motion, by its damping rate and a trial."""
+    h = timing.integration_step_s
+    if not can_follow(p, limits, speed_mps, h):
+        shorter = [step for k in range(1, 16) if (step := timing.control_step_s / 2**k) < h]
+        remedy = next(
+            (f"use at most {step:.3g}, or " for step in shorter if can_follow(p, limits, speed_mps, step)), ""
         )
+        steers = f"max_torque_nm = {limits.max_torque_nm:g}"
+        if limits.kind == "rudder":
+            steers = f"rudder_max_deg = {limits.rudder_max_deg:g}"
+        raise ValueError(
+            f"timing.integration_step_s = {h:g} is too long for this vehicle, so that Runge-Kutta diverges "
+            f"under actuators.max_force_n = {limits.max_force_n:g} and {steers}; "
+            f"{remedy}lower these limits, the vehicle's resistances or its added masses"
+        )
+
+
+def can_follow(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) -> bool:
+    """Whether Runge-Kutta can follow the fastest motion with a step [s]. Arguments as for ``check_vehicle``."""
+    if not _damping_rate(p, limits, speed_mps) * step_s < RK4_LIMIT:
+        return False
+    return not _diverges(p, limits, speed_mps, step_s)  # pyright: ignore[reportArgumentType] - frozen models have a hash
 
 
 def _damping_rate(p: Vehicle, limits: Actuators, speed_mps: float) -> float:
     """Damping rate [1/s] at the largest speeds under full force and torque, or at the start."""
     u = max(top_speed(p, limits), speed_mps)
-    rudder_nm = limits.rudder[1] * math.radians(limits.rudder_max_deg) * u**2
-    r = _terminal(p.N_r, p.N_rr, limits.max_torque_nm if limits.kind == "force_torque" else rudder_nm)
+    r = _terminal(p.N_r, p.N_rr, _most_moment(limits, u))
     sway = [p.Y_v + 2 * p.Y_vv * u - p.Y_uv * u, -p.Y_r - 2 * p.Y_rr * r - p.Y_ur * u]
     yaw = [-p.N_v - p.N_rv * r - 2 * p.N_vv * u - p.N_uv * u, p.N_r + 2 * p.N_rr * r - p.N_ur * u]
     sway_yaw = float(np.abs(np.linalg.eigvals(np.linalg.solve(inertia_matrix(p)[1:, 1:], [sway, yaw]))).max())
     return max(sway_yaw, (p.X_u + 2 * p.X_uu * u) / (p.m_kg - p.X_udot_kg))
+
+
+def _most_moment(limits: Actuators, speed_mps: float) -> float:
+    """Largest steering yaw moment [N m] at a speed ahead [m/s]."""
+    if limits.kind == "force_torque":
+        return limits.max_torque_nm
+    return limits.rudder[1] * math.radians(limits.rudder_max_deg) * speed_mps**2
+
+
+@lru_cache(maxsize=1024)
+def _diverges(p: Vehicle, limits: Actuators, speed_mps: float, step_s: float) -> bool:
+    """Whether Runge-Kutta diverges in a trial of Eq. 2 at full action, constant and switched."""
+    inverse = np.linalg.inv(inertia_matrix(p))
+    motion = inverse @ resistance(p)
+    thrust, steer = _pushes(limits)
+    fin = np.outer(inverse[:, 1:] @ limits.rudder, np.ones(RUNS))
+    push = inverse[:, :1] * thrust[:, None]
+    if limits.kind == "force_torque":
+        push += inverse[:, 2:] * steer[:, None]
+    # Half of them start at the speeds that an action holds alone, so that short steps need no time to reach them.
+    nu = np.zeros((3, RUNS))
+    nu[0] = speed_mps
+    held = np.array([[math.cos(k), math.sin(k)] for k in range(RUNS // 2)]).T
+    nu[0, ::2] = [_terminal(p.X_u, p.X_uu, limits.max_force_n * share) for share in held[0]]
+    most = _most_moment(limits, max(top_speed(p, limits), speed_mps))
+    nu[2, ::2] = [_terminal(p.N_r, p.N_rr, most * share) for share in held[1]]
+    factor = np.ones((7, RUNS))
+
+    def rate(nu: Float64, k: int) -> Float64:
+        factor[1:4], factor[4:] = nu, np.abs(nu)
+        total = push[k] + motion @ (nu[:, None] * factor).reshape(21, RUNS)
+        return total + fin * (np.maximum(nu[0], 0.0) ** 2 * steer[k]) if limits.kind == "rudder" else total
+
+    with np.errstate(all="ignore"):
+        for k in range(TRIAL_STEPS):
+            a = rate(nu, k)
+            b = rate(nu + step_s / 2 * a, k)
+            c = rate(nu + step_s / 2 * b, k)
+            d = rate(nu + step_s * c, k)
+            nu += step_s / 6 * (a + 2 * (b + c) + d)
+            if k % 50 == 49 and not (np.abs(nu) < RUNAWAY).all():
+                return True
+    return False
 
 
 def resistance(p: Vehicle) -> Float64:
@@ -139,3 +198,18 @@ def resistance(p: Vehicle) -> Float64:
     lift = np.array([[p.Y_uv, p.Y_ur], [p.N_uv, p.N_ur]])
     force[1:, 1:, [1, 4]] += lift[:, :, None] / 2  # max(u, 0) = (u + |u|) / 2
     return force.reshape(3, 21)
+
+
+def _pushes(limits: Actuators) -> tuple[Float64, Float64]:
+    """Thrust, and torque or rudder, of all trials, shape (step, run); 16 constant, others for 1 to 100 steps."""
+    runs, every = np.arange(RUNS), np.resize([1, 2, 5, 20, 100], RUNS)
+    every[:16] = TRIAL_STEPS
+    drawn = np.random.default_rng(0).integers(0, 16, (TRIAL_STEPS, RUNS))
+    drawn[0, :16] = runs[:16]
+    angle = drawn[np.arange(TRIAL_STEPS)[:, None] // every, runs] * math.pi / 8
+    a_x, a_y = np.cos(angle), np.sin(angle)
+    most = limits.max_torque_nm
+    if limits.kind == "rudder":  # a box, in place of the disc
+        a_x, a_y = (share / np.maximum(np.abs(a_x), np.abs(a_y)) for share in (a_x, a_y))
+        most = math.radians(limits.rudder_max_deg)
+    return np.where(a_x < 0.0, limits.astern_n, limits.max_force_n) * a_x, most * a_y
