@@ -126,35 +126,35 @@ def learned(problem, iterations, by, made=None):
     return learner, rewards
 
 
-def updated(change, memory):
+def updated(change, memory, minibatches=10):
     """A learner's arrays after an update on a batch that ``change`` has replaced."""
     problem = Toy(lambda x, a: x[:, 0] * a[:, 1], 4)
     problem.part = np.arange(64) % 2
     made = Architecture(hidden=(32,), memory=memory)
-    learner = learner_for(problem, Ppo(horizon=8), made)
+    learner = learner_for(problem, Ppo(horizon=8, minibatches=minibatches), made)
     batch, _ = learner.sample(problem, 0.4)
     learner.update(change(batch), 0.4, 1e-3)
     return learner.arrays()
 
 
-@pytest.mark.parametrize("memory", [False, True])
-def test_rows_of_lost_vehicles_change_nothing(memory):
-    """What lost vehicles do and are paid has no effect on an update."""
+@pytest.mark.parametrize(("memory", "since", "minibatches"), [(False, 3, 10), (True, 3, 10), (True, 0, 64)])
+def test_rows_of_lost_vehicles_change_nothing(memory, since, minibatches):
+    """What lost vehicles do and receive has no effect on an update, even where a minibatch has no others."""
 
     def lost(garbage):
         def change(batch):
             at = torch.arange(64) % 5 == 0
             acted = batch.acted.clone()
-            acted[3:, at] = 0.0
+            acted[since:, at] = 0.0
             own = {name: getattr(batch, name).clone() for name in ("action", "mean", "advantage", "returns")}
             for values in own.values():
-                values[3:, at] = garbage
+                values[since:, at] = garbage
             return batch._replace(acted=acted, **own)
 
         return change
 
-    one, other = (updated(lost(garbage), memory) for garbage in (0.0, 50.0))
-    whole = updated(lambda batch: batch, memory)
+    one, other = (updated(lost(garbage), memory, minibatches) for garbage in (0.0, 50.0))
+    whole = updated(lambda batch: batch, memory, minibatches)
     assert all((one[name] == other[name]).all() for name in one)
     assert any((one[name] != whole[name]).any() for name in one)
 

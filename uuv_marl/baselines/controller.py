@@ -6,6 +6,7 @@ import numpy as np
 
 from uuv_marl.baselines.policy import Policy, tuned
 from uuv_marl.baselines.requirements import PolicyRequirements
+from uuv_marl.baselines.steering import velocity_gain
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.types import Float32
@@ -23,7 +24,7 @@ class Controller(Policy):
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Any = None) -> None:
         super().__init__(scenario, num_worlds)
         self.gains = gains or self.Gains(**(tuned(self.tuned_as) if self.tuned_as else {}))
-        self._centres = scenario.sonar.echo_reports == "centre"
+        self._centres, self._gain = scenario.sonar.echo_reports == "centre", velocity_gain(scenario)
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""

@@ -18,10 +18,10 @@ from uuv_marl.tasks import Follow
 NOTHING = "–"
 """Cell without a value."""
 _NARROW = 110
-"""Columns of a terminal below which its table has no space beside its lines."""
+"""Columns of a terminal below which its table omits intervals, and space beside its lines."""
 _NEEDS = "class, and extra observations"
-_WIDE = (_NEEDS, "worst time [s]", "mean spacing [m]", "within Eq. 7")
-"""Columns that a terminal's table omits, as it omits intervals; the first is below the policy's name."""
+_WIDE = (_NEEDS, "mean spacing [m]", "within Eq. 7")
+"""Columns that a terminal's table omits; the first is below the policy's name, and a worst value below its mean."""
 _INTERVAL = " [95 % bootstrap interval]"
 _MEANINGS = {
     "policy": f"Interquartile mean over seeds{_INTERVAL}; worst seed; times over the seeds that arrived.",
@@ -149,19 +149,23 @@ def _paper_cell(paper: PaperFigure) -> str:
 
 def terminal_table(table: Table, width: int) -> RichTable:
     """A table for a terminal of a given width in columns; names of policies are folded last, and never cut."""
+    narrow, caption = width < _NARROW, table.caption(*_WIDE)
     out = RichTable(
-        title=table.title, title_justify="left", caption=escape(table.caption(*_WIDE).replace(_INTERVAL, "")),
-        caption_justify="left", padding=0 if width < _NARROW else (0, 1), show_lines=True,
+        title=table.title, title_justify="left", caption=escape(caption.replace(_INTERVAL, "") if narrow else caption),
+        caption_justify="left", padding=0 if narrow else (0, 1), show_lines=True,
     )  # fmt: skip
-    shown = [name for name in table.rows[0] if name not in _WIDE]
+    shown = [name for name in table.rows[0] if name not in _WIDE and not name.startswith("worst ")]
     longest = max(22, *(len(row["policy"]) for row in table.rows))
     for name in shown:
         out.add_column(escape(name), overflow="fold", width=min(longest, width // 5) if name == "policy" else None)
     for row in table.rows:
-        cells = [row[name].partition(" [")[0].replace(NOTHING, "-") for name in shown]  # a dash every terminal has
+        cells = [row[name].partition(" [")[0] if narrow else row[name] for name in shown]
         if row[_NEEDS] != NOTHING:
             cells[0] += f"\n({row[_NEEDS]})"
-        out.add_row(*map(escape, cells))
+        for k, name in enumerate(shown):  # "worst time [s]" for "task time [s]"
+            if worst := row.get(f"worst {' '.join(name.split()[-2:])}"):
+                cells[k] += f"\nworst {worst}"
+        out.add_row(*(escape(cell.replace(NOTHING, "-")) for cell in cells))  # a dash that every terminal has
     return out
 
 

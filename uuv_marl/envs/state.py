@@ -4,18 +4,8 @@ from typing import cast
 
 import numpy as np
 
-from uuv_marl.percept import (
-    DIRECTION,
-    DURATION,
-    FLAG,
-    LENGTH,
-    POSITION,
-    SPEED,
-    YAW_RATE,
-    PerceptField,
-    PerceptLayout,
-    Quantity,
-)  # fmt: skip
+from uuv_marl import percept
+from uuv_marl.percept import DIRECTION, FLAG, LENGTH, POSITION, SPEED, YAW_RATE, PerceptField, PerceptLayout, Quantity
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.task import Task
@@ -39,8 +29,8 @@ def state_table(scenario: Scenario) -> tuple[PerceptField, ...]:
         PerceptField("reference_velocity", (2,), SPEED, "velocity of l(t), north and east"),
         PerceptField("end", (groups, 2), POSITION, "per group: end of its trajectory relative to l(t), north and east"),
         PerceptField("time", (1,), _TIME, "share of the time limit that has passed"),
-        PerceptField("time_left", (1,), DURATION, "time until the limit"),
-        PerceptField("motion_left", (1,), DURATION, "time until l(t) rests"),
+        PerceptField("time_left", (1,), percept.DURATION, "time until the limit"),
+        PerceptField("motion_left", (1,), percept.DURATION, "time until l(t) rests"),
         PerceptField("obstacle", (m,), FLAG, "per obstacle: 1, or 0 for an unused row"),
         PerceptField("obstacle_position", (m, 2), POSITION, "per obstacle: centre relative to l(t), north and east"),
         PerceptField("obstacle_radius", (m,), LENGTH, "per obstacle: radius"),

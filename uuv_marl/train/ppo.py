@@ -135,7 +135,7 @@ class Learner:
                 acts = done if self.imitating else acts
             action[t] = acts + noise * torch.from_numpy(drawn)
             transition = env.step(action[t].numpy())
-            mean_reward += float(transition.reward.mean()) / config.horizon
+            mean_reward += float(transition.reward[transition.acted].mean()) / config.horizon
             reward[t], ended[t + 1] = transition.reward, transition.terminated | transition.truncated
             acted[t] = torch.from_numpy(transition.acted)
             if len(transition.final):
@@ -185,7 +185,8 @@ class Learner:
         )
         new, states = self.actor.through(x[:, :, : self._features], batch.state[rows], continues)
         action, old, expert_action = (array.reshape(-1, 2) for array in (action, old, expert_action))
-        weight, advantage, part = acted.reshape(-1) / acted.sum(), advantage.reshape(-1), part.reshape(-1)
+        weight = acted.reshape(-1) / acted.sum().clamp(min=1.0)  # in a minibatch all vehicles may be lost
+        advantage, part = advantage.reshape(-1), part.reshape(-1)
         double = 2.0 * noise * noise
         ratio = (((action - old).square() - (action - new).square()).sum(-1) / double).exp()
         clipped = ratio.clamp(1.0 - self.config.clip, 1.0 + self.config.clip)
@@ -196,8 +197,8 @@ class Learner:
         prediction = self._critic_output(x.reshape(-1, x.shape[2]), states.detach(), part)
         self._optimiser.zero_grad()
         (loss + weight @ (prediction - returns.reshape(-1)).square()).backward()
-        for part in self._parts:
-            nn.utils.clip_grad_norm_(part, self.config.max_gradient)
+        for tensors in self._parts:
+            nn.utils.clip_grad_norm_(tensors, self.config.max_gradient)
         self._optimiser.step()
         return apart.item() / double
 

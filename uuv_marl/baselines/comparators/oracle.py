@@ -14,7 +14,7 @@ from uuv_marl.baselines.controller import Controller
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
-from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
+from uuv_marl.baselines.steering import full_speed, steer
 from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
@@ -44,11 +44,11 @@ class Oracle(Controller):
     Gains = OracleGains
 
     def _write(self, percept: Percept, action: Float32) -> None:
-        flat, gain = self.flat(percept), velocity_gain(self.scenario)
+        flat = self.flat(percept)
         path, walls = percept["path"], percept["path_walls"]
         length = percept["path_length"] * (percept["right_of_way"] if "right_of_way" in self.layout.starts else 1.0)
         planes = np.zeros((walls.shape[2] + self.scenario.sonar.num_sectors, 3))
-        _act(flat, self.at, path, length, walls, self.gains, self.limits, gain, planes, action)
+        _act(flat, self.at, path, length, walls, self.gains, self.limits, self._gain, planes, action)
 
 
 @compiled

@@ -17,7 +17,7 @@ from uuv_marl.baselines.paper.bio_inspired import counts_once
 from uuv_marl.baselines.policy import Limits, tuned
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
-from uuv_marl.baselines.steering import full_speed, steer, velocity_gain
+from uuv_marl.baselines.steering import full_speed, steer
 from uuv_marl.percept import Fields, Percept, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
@@ -52,8 +52,8 @@ class OrcaInformed(Controller):
         self._planes: Float64 = np.zeros((scenario.sonar.num_sectors + scenario.sonar.num_active_sectors, 3))
 
     def _write(self, percept: Percept, action: Float32) -> None:
-        flat, period, gain = self.flat(percept), self.scenario.timing.decision_period_s, velocity_gain(self.scenario)
-        _act(flat, self.at, self.gains, self.limits, gain, period, self._centres, self._planes, action)
+        flat, period = self.flat(percept), self.scenario.timing.decision_period_s
+        _act(flat, self.at, self.gains, self.limits, self._gain, period, self._centres, self._planes, action)
 
 
 @compiled

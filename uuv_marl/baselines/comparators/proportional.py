@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from uuv_marl.baselines.controller import Controller
 from uuv_marl.baselines.policy import Limits
-from uuv_marl.baselines.steering import steer, velocity_gain
+from uuv_marl.baselines.steering import steer
 from uuv_marl.percept import Percept, Starts
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
@@ -23,8 +23,7 @@ class ProportionalTracking(Controller):
     Gains = ProportionalGains
 
     def _write(self, percept: Percept, action: Float32) -> None:
-        gain = velocity_gain(self.scenario)
-        _act(self.flat(percept), self.layout.offsets, self.gains, self.limits, gain, action)
+        _act(self.flat(percept), self.layout.offsets, self.gains, self.limits, self._gain, action)
 
 
 @compiled

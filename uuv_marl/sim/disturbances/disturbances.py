@@ -137,16 +137,9 @@ def take_readings(w: int, world: World, at: Starts, d: Disturbances) -> None:
             noise.add_errors(reading, num, d.keys[w], passive, d.noise_model, d.sensor_errors, d.detections)
             readings.store(reading, num, timing, d.detections, d.delay_line)
             noise.apply_outages(
-                reading,
-                d.keys[w],
-                timing,
-                d.noise_model,
-                d.sensor_errors,
-                d.actuation_model,
-                d.hull,
-                d.detections,
+                reading, d.keys[w], timing, d.noise_model, d.sensor_errors, d.actuation_model, d.hull, d.detections,
                 d.delay_line,
-            )
+            )  # fmt: skip
 
 
 @compiled_inner
