@@ -38,7 +38,7 @@ def benchmark(
     seeds: Annotated[
         int, typer.Option(min=1, max=10_000, help="Runs seeds 0 to SEEDS - 1. Tuning and training use higher seeds.")
     ] = 20,
-    overrides: Annotated[list[str] | None, overrides_option("sonar.echo_reports=surface")] = None,
+    overrides: Annotated[list[str] | None, overrides_option("`sonar.echo_reports=surface`")] = None,
     output: Annotated[Path, path_option("Folder of results, table and pictures.")] = Path("results/benchmark"),
     restart: Restart = False,
 ) -> None:

@@ -36,9 +36,9 @@ Restart = Annotated[
 MANY_POLICIES = "Name, checkpoint (runs/mine/best) or module:Class. Repeat it for several. Default: {}"
 
 
-def overrides_option(example: str) -> Any:
-    """The option ``--set``, with an example."""
-    return typer.Option("--set", metavar="FIELD=VALUE", help=f"Override a field, such as `{example}`.")
+def overrides_option(examples: str) -> Any:
+    """The option ``--set``, with examples in Markdown."""
+    return typer.Option("--set", metavar="FIELD=VALUE", help=f"Override a field, such as {examples}.")
 
 
 _PACKAGE = str(Path(__file__).resolve().parent.parent)

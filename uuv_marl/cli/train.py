@@ -1,11 +1,9 @@
 """``uuv-marl train``: train a policy on a scenario or from a recipe."""
 
-import re
 import shlex
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,6 +15,7 @@ from uuv_marl.cli.console import (
     extra,
     find_modules,
     overridden,
+    overrides_option,
     path_option,
     progress_bar,
     progress_line,
@@ -26,41 +25,24 @@ from uuv_marl.cli.console import (
 _SUMMARY = "swarm success {swarm_success:.0%}, vehicles {share:.0%}, collisions {collisions:.1f} per episode"
 
 
-def _whole_number(text: str) -> int:
-    """A number such as 3000000 or 3e6."""
-    number = re.fullmatch(r"[0-9]{1,15}(\.[0-9]{1,15})?(e[0-9]{1,2})?", str(text)) and Decimal(text)
-    if not number or number < 1 or number != int(number):
-        raise typer.BadParameter(f"{text!r} is not a whole number from 1 on; give a number such as 3000000 or 3e6")
-    return int(number)
-
-
 def train_command(
-    context: typer.Context,
     scenario: Annotated[
-        str,
+        str | None,
         typer.Argument(
-            help="Name or TOML file of a scenario, or a file with fields of uuv_marl.train.training.Training."
+            help="Name or TOML file of a scenario, or a file with fields of uuv_marl.train.training.Training. "
+            "Default: starter."
         ),
-    ] = "starter",
+    ] = None,
     overrides: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Change a field of the training, such as `network.memory=true`, `sizes=[5,10]`, `critic=own` or "
-            "`reward=mine:reward`, or of the scenario, such as `sonar.echo_reports=surface`.",
-        ),
+        overrides_option("`network.memory=true`, `critic=own` or, of the scenario, `sonar.echo_reports=surface`"),
     ] = None,
     minutes: Annotated[
         float | None, typer.Option(min=0.01, help="Processor time in all, validations apart. Default: 5.")
     ] = None,
     steps: Annotated[
-        int | None,
-        typer.Option(
-            parser=_whole_number,
-            metavar="NUMBER",
-            help="Instead of minutes, agent-steps in all, such as 3e6: decisions times vehicles.",
-        ),
+        float | None,
+        typer.Option(min=1, help="Instead of minutes, agent-steps in all, such as 3e6: decisions times vehicles."),
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of worlds, weights and noise.")] = None,
     output: Annotated[Path, path_option("Folder for the training's description, progress and checkpoints.")] = Path(
@@ -86,25 +68,24 @@ def train_command(
     with explained():
         with extra("train", "training"):
             from uuv_marl.train import run
-        from uuv_marl.errors import TrainingError
         from uuv_marl.train.folder import TrainingFolder
         from uuv_marl.train.training import Training, changed_fields, recipe_fields
 
-        find_modules([":" if resume else scenario, *(overrides or [])])
-        named = {"minutes": minutes, "steps": steps, "seed": seed}
-        changes = {name: value for name, value in named.items() if value is not None}
+        find_modules([":" if resume else scenario or "", *(overrides or [])])
         if resume:
-            _alone(context)
+            fixed = {"the scenario": scenario, "--set": overrides, "--seed": seed}
+            if given := next((name for name, value in fixed.items() if value is not None), None):
+                raise typer.BadParameter(f"--resume continues the training in the folder; leave out {given}")
             folder = TrainingFolder(output, None)
             training, until = folder.training, folder.budget_with(minutes, steps)
         else:
-            fields_given = recipe_fields(scenario)
-            for name in {"minutes", "steps"} & changes.keys():
-                fields_given.pop("steps" if name == "minutes" else "minutes", None)
-            fields = overridden(overrides or [])
-            if twice := next((name for name in changes if name in fields), None):
-                raise TrainingError(f"--{twice} and --set {twice} are both given; leave one out")
-            training = Training(**changed_fields(fields_given, {**fields, **changes}))
+            options = {"minutes": minutes, "steps": steps, "seed": seed}
+            named = [f"{name}={value}" for name, value in options.items() if value is not None]
+            changes, fields = overridden([*named, *(overrides or [])]), recipe_fields(scenario or "starter")
+            for name, other in (("minutes", "steps"), ("steps", "minutes")):
+                if name in changes:
+                    fields.pop(other, None)
+            training = Training(**changed_fields(fields, changes))
             until = training.budget
         with _stoppable(output) as stop:
             how: Any = {"say": say, "stop": stop}
@@ -116,19 +97,6 @@ def train_command(
             scores = f"{_SUMMARY.format(**best._asdict())}, after {best.seconds / 60.0:.1f} min"
             say(f"Best validation: {scores}. Its worst episode:")
             say(f"  {worst}")
-
-
-_OPTIONS = {"overrides": "--set", "scenario": "the scenario"}
-
-
-def _alone(context: typer.Context) -> None:
-    """Refuse options that the folder determines."""
-    for name in context.params:
-        given = getattr(context.get_parameter_source(name), "name", None) == "COMMANDLINE"
-        if given and name not in ("resume", "output", "steps", "minutes"):
-            raise typer.BadParameter(
-                f"--resume continues the training in the folder; leave out {_OPTIONS.get(name, f'--{name}')}"
-            )
 
 
 def _follow(records: Iterator[Any], training: Any, until: float) -> str:
@@ -165,12 +133,7 @@ def _stoppable(output: Path) -> Iterator[Callable[[], bool]]:
     finally:
         signal.signal(signal.SIGINT, before)
     if noted:
-        again = f"uuv-marl train --resume --output {shlex.quote(str(output))}"
-        if any((output / "checkpoints").glob("[0-9]*[0-9]")):
-            rest = f"The last checkpoint is in {output}; {again} continues."
-        elif (output / "config.json").exists():
-            rest = f"There is no checkpoint yet: {again} starts again."
-        else:
-            rest = "Nothing was written yet; the same command starts again."
-        say(f"Stopped. {rest}")
+        again = f"uuv-marl train --resume --output {shlex.quote(str(output))} continues from the last checkpoint"
+        begun = (output / "config.json").exists()
+        say(f"Stopped. {again if begun else 'Nothing was written yet; the same command starts again'}.")
         raise typer.Exit(130)

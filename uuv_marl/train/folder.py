@@ -1,7 +1,6 @@
 """The folder of a training: its description, a row per iteration, and the last checkpoint, complete at any time."""
 
 import json
-import math
 import re
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -17,6 +16,7 @@ from uuv_marl.atomic import locked, write_text, writing
 from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.errors import PolicyError, ResultsError, ScenarioError, TrainingError
+from uuv_marl.scenario.overrides import leaves
 from uuv_marl.train.training import Training
 
 _CHECKPOINT_NAME = re.compile(r"\d{6,}(\.partial)?")
@@ -30,10 +30,6 @@ Say = Callable[[str], object]
 
 Stop = Callable[[], bool]
 """Called after every iteration; the training ends with a checkpoint once it returns True."""
-
-
-def quiet(_: str) -> None:
-    """Discard a message."""
 
 
 class Record(NamedTuple):
@@ -76,7 +72,7 @@ class TrainingFolder:
     """
 
     def __init__(self, path: Path, training: Training | None) -> None:
-        self.path = path
+        self.path, self._checkpoints, self._table = path, path / "checkpoints", path / "progress.csv"
         self.until = 0.0
         """The budget of the latest run: agent-steps, or seconds."""
         self.record = Record()
@@ -84,16 +80,15 @@ class TrainingFolder:
         self.resume_note = ""
         """Message that says where a resumed training starts."""
         if training is None:
-            self.training = self._read()
-            self._find()
-            self.resume_note += self.version_note
+            self.training, version_note = self._read()
+            self.resume_note = self._find() + version_note
             return
         self.training, self.until = training, training.budget
         if path.exists() and not (path.is_dir() and all(_HIDDEN.fullmatch(inner.name) for inner in path.iterdir())):
             raise ResultsError(f"{path} is not empty; give --resume to continue it, or another --output")
 
-    def _read(self) -> Training:
-        """The training that the folder holds."""
+    def _read(self) -> tuple[Training, str]:
+        """The training that the folder holds, and a message if other versions ran it before."""
         try:
             config = json.loads((self.path / "config.json").read_text(encoding="utf-8"))
             before, saved_versions = dict(config["scenarios"]), dict(config["versions"])
@@ -109,39 +104,34 @@ class TrainingFolder:
                 "empty --output"
             ) from None
         for name, content in scenarios_now.items():
-            for field, then, now in _differences(before.get(name, content), content):
+            then, now = leaves(before.get(name, content)), leaves(content)
+            if field := next((field for field in {**now, **then} if then.get(field) != now.get(field)), None):
                 raise ResultsError(
-                    f"{self.path} was started with {field} = {then}, and {field} is {now} now; restore {name}, or "
-                    "start again with another --output"
+                    f"{self.path} was started with {field} = {then.get(field)}, and {field} is {now.get(field)} now; "
+                    f"restore {name}, or start again with another --output"
                 )
         other = [f"{name} {old}" for name, old in saved_versions.items() if old != versions().get(name)]
-        self.version_note = (
-            f"; earlier parts ran with {', '.join(other)}, so the result is not bit-identical" if other else ""
-        )
-        return training
+        note = f"; earlier parts ran with {', '.join(other)}, so the result is not bit-identical" if other else ""
+        return training, note
 
-    def _find(self) -> None:
-        """Find the last complete checkpoint."""
-        broken = ""
+    def _find(self) -> str:
+        """Find the last checkpoint; where the training starts, as a message."""
         checkpoints = [path for path in self._checkpoints.glob("*") if path.name.isdecimal() and _ours(path)]
-        for path in sorted(checkpoints, reverse=True):
-            try:
-                text = (path / "record.json").read_text(encoding="utf-8")
-                record = TypeAdapter(Record).validate_json(text)
-                if record.iteration != int(path.name):
-                    raise ValueError
-            except (OSError, ValueError) as error:
-                broken = f"{path} is incomplete (record.json: {getattr(error, 'strerror', None) or 'damaged'}); "
-            else:
-                self.record = record
-                done = f"iteration {record.iteration}, {record.agent_steps:,} agent-steps"
-                self.resume_note = f"{broken}resuming from {done}"
-                return
-        if broken:
-            raise ResultsError(f"{broken}copy the whole folder again, or delete it to start from the beginning")
-        self.resume_note = f"{self.path} holds no checkpoint yet: starting from the beginning"
+        if not checkpoints:
+            return f"{self.path} holds no checkpoint yet: starting from the beginning"
+        last = max(checkpoints, key=lambda path: int(path.name))
+        try:
+            self.record = TypeAdapter(Record).validate_json((last / "record.json").read_bytes())
+            if self.record.iteration != int(last.name):
+                raise ValueError
+        except (OSError, ValueError) as error:
+            raise ResultsError(
+                f"{last} is incomplete (record.json: {getattr(error, 'strerror', None) or 'damaged'}); copy the whole "
+                "folder again, or delete it to continue from what is left"
+            ) from None
+        return f"resuming from iteration {self.record.iteration}, {self.record.agent_steps:,} agent-steps"
 
-    def budget_with(self, minutes: float | None, steps: int | None) -> float:
+    def budget_with(self, minutes: float | None, steps: float | None) -> float:
         """The total budget of a resumed training in its own unit: agent-steps, or seconds.
 
         Raises:
@@ -151,14 +141,7 @@ class TrainingFolder:
         budgets = {"minutes": minutes and 60.0 * minutes, "steps": steps}
         if budgets[other] is not None:
             raise TrainingError(f"the training in {self.path} has a budget of {kind}; give --{kind}, not --{other}")
-        until = float(budgets[kind] or self.until)
-        if not math.isfinite(until):
-            raise TrainingError(f"{kind} must be a finite number, got {until}")
-        return until
-
-    @property
-    def _checkpoints(self) -> Path:
-        return self.path / "checkpoints"
+        return float(budgets[kind] or self.until)
 
     @property
     def checkpoint(self) -> Path | None:
@@ -210,13 +193,9 @@ class TrainingFolder:
         rows = [line.split(",") for line in lines]
         return [row for row in rows if len(row) == len(Record._fields) and row[0].isdecimal()]
 
-    @property
-    def _table(self) -> Path:
-        return self.path / "progress.csv"
-
 
 @contextmanager
-def opened(path: Path, training: Training | None, say: Say = quiet) -> Iterator[TrainingFolder]:
+def opened(path: Path, training: Training | None, say: Say) -> Iterator[TrainingFolder]:
     """The folder of a training, locked for the block; arguments as for ``TrainingFolder``.
 
     ``say`` is called with where a resumed training starts.
@@ -252,12 +231,3 @@ def _ours(path: Path) -> bool:
 
 def _line(row: Sequence[object]) -> str:
     return ",".join("" if value is None else str(value) for value in row) + "\n"
-
-
-def _differences(then: Any, now: Any, field: str = "") -> Iterator[tuple[str, object, object]]:
-    """Differences between two versions of a scenario: field, before, now."""
-    if isinstance(then, dict) and isinstance(now, dict):
-        for name in {**now, **then}:
-            yield from _differences(then.get(name), now.get(name), f"{field}.{name}" if field else name)
-    elif then != now:
-        yield field, then, now

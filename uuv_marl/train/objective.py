@@ -1,13 +1,7 @@
 """The objective of a training as text: rewards with their terms and weights, and additional costs."""
 
-import re
-from collections.abc import Mapping
-
 from uuv_marl.scenario import Scenario
 from uuv_marl.train.training import Training
-
-_WEIGHT = re.compile(r"\bw_(\w+)|\bw\b|\b(progress(?:_far)?_m)\b")
-"""Numbers of the scenario's table ``reward`` in a term's formula."""
 
 
 def objective(training: Training) -> str:
@@ -29,21 +23,10 @@ def objective(training: Training) -> str:
 
 
 def _reward(name: str | None, scenario: Scenario) -> tuple[str, str]:
-    """Name of a reward, and a line for each of its terms; no lines for a function of the user."""
+    """Name of a reward, and a line for its weights and each of its terms; no lines for a function of the user."""
     if name is not None and ":" in name:
         return name, ""
-    task, weights = scenario.task_class, scenario.reward.model_dump()
-    first = next(iter(task.rewards))
-    formulas = task.rewards.get(name or first, task.rewards[first])
-    terms = [f"\n  {term}: {_with_numbers(term, formula, weights)}" for term, formula in formulas.items()]
-    return f"{name or first} of task {scenario.task.name}", "".join(terms) or ": none"
-
-
-def _with_numbers(term: str, formula: str, weights: Mapping[str, float]) -> str:
-    """A formula with the values of its weights instead of their names."""
-
-    def number(found: re.Match[str]) -> str:
-        value = weights.get(found[1] or found[2] or term)
-        return found[0] if value is None else f"{value:g}{' m' * bool(found[2])}"
-
-    return _WEIGHT.sub(number, formula)
+    task, first = scenario.task_class, next(iter(scenario.task_class.rewards))
+    terms = [f"\n  {term}: {formula}" for term, formula in task.rewards.get(name or first, task.rewards[first]).items()]
+    weights = ", ".join(f"{weight} {value:g}" for weight, value in scenario.reward.model_dump().items())
+    return f"{name or first} of task {scenario.task.name}", f"\n  weights w: {weights}{''.join(terms)}"

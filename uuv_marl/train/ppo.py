@@ -32,13 +32,6 @@ _ADAM = ("step", "exp_avg", "exp_avg_sq")
 """State of the optimiser for each tensor."""
 
 
-class Update(NamedTuple):
-    """Diagnostics of an update."""
-
-    kl: float
-    explained: float
-
-
 class Rollout(NamedTuple):
     """Samples of a horizon, shape (time, row, ...)."""
 
@@ -94,7 +87,7 @@ class Learner:
 
     def set_imitation(self, imitating: bool, imitation_weight: float = 0.0) -> None:
         """Switch imitation on or off, and set ``imitation_weight`` of PPO's loss."""
-        if self.imitating and not imitating:  # the old moments would double the first updates' ``Update.kl``
+        if self.imitating and not imitating:  # the old moments would double the first updates' divergence
             self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
         self.imitating, self.imitation_weight = imitating, imitation_weight
 
@@ -153,8 +146,8 @@ class Learner:
         arrays = torch.from_numpy(advantage), torch.from_numpy(advantage + value[:-1]), continues, acted, part[:-1]
         return Rollout(observation[:-1], action, mean, expert_action, *arrays, first), mean_reward
 
-    def update(self, batch: Rollout, noise: float, learning_rate: float) -> Update:
-        """Train actor and critic on a batch: by PPO, or by imitation of the expert."""
+    def update(self, batch: Rollout, noise: float, learning_rate: float) -> tuple[float, float]:
+        """Train actor and critic on a batch, by PPO or by imitation of the expert; ``Record.kl`` and ``explained``."""
         self._optimiser.param_groups[0]["lr"] = learning_rate
         acted = batch.acted > 0.0
         error = (batch.advantage[acted].var() / batch.returns[acted].var().clamp(min=1e-12)).item()
@@ -176,7 +169,7 @@ class Learner:
             kl = sum(divergences) / len(divergences)
             if kl > self.config.kl_stop and not self.imitating:
                 break
-        return Update(kl, 1.0 - error)
+        return kl, 1.0 - error
 
     def _descend(self, batch: Rollout, rows: Tensor, noise: float) -> float:
         """One gradient step on some rows; the divergence from the policy that sampled, or from the expert."""
@@ -228,10 +221,14 @@ class Learner:
         """The actor's weights, for a checkpoint."""
         return {name: x.detach().numpy().copy() for name, x in self.actor.tensors.items()}
 
+    def _tensors(self) -> dict[str, Tensor]:
+        """Recurrent state and parameters by name."""
+        actor = {f"actor.{name}": x for name, x in self.actor.tensors.items()}
+        return {"state": self.state, **actor, **{f"critic.{k}": x for k, x in enumerate(self.critic)}}
+
     def arrays(self) -> dict[str, NDArray[Any]]:
         """The complete state, for ``restore``."""
-        tensors = {"state": self.state, **{f"actor.{name}": x for name, x in self.actor.tensors.items()}}
-        tensors |= {f"critic.{k}": x for k, x in enumerate(self.critic)}
+        tensors = self._tensors()
         for k, moments in self._optimiser.state_dict()["state"].items():
             tensors |= {f"adam.{k}.{name}": x for name, x in moments.items()}
         arrays = {"moments": self._moments.copy(), "imitating": np.array([self.imitating])}
@@ -239,24 +236,15 @@ class Learner:
 
     @torch.no_grad()
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Restore the ``arrays`` of a learner of the same sizes."""
-        if begun := any(name.startswith("adam.") for name in arrays):
-            wanted = {f"adam.{k}.{name}" for k in range(sum(map(len, self._parts))) for name in _ADAM}
-            if lacking := sorted(wanted - arrays.keys()):
-                raise ValueError(f"{lacking[0]} is missing")
-        if not begun and np.array(arrays["moments"]).any():
-            raise ValueError("the optimiser's arrays adam.* are missing")
+        """Restore the ``arrays`` of a learner of the same sizes. Raises KeyError or ValueError for others."""
         tensors = {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
         self._moments, self.imitating = np.array(arrays["moments"]), bool(arrays["imitating"][0])
-        for name, x in [("state", self.state), *((f"actor.{name}", x) for name, x in self.actor.tensors.items()),
-                        *((f"critic.{k}", x) for k, x in enumerate(self.critic))]:  # fmt: skip
+        for name, x in self._tensors().items():
             if tensors[name].shape != x.shape:
                 raise ValueError(f"{name} must have shape {tuple(x.shape)}, got {tuple(tensors[name].shape)}")
             x.copy_(tensors[name])
-        state: dict[int, dict[str, Tensor]] = {}
-        for name in (name for name in tensors if name.startswith("adam.")):
-            _, k, key = name.split(".")
-            state.setdefault(int(k), {})[key] = tensors[name]
+        updated = range(sum(map(len, self._parts))) if self._moments.any() else ()  # the first update starts both
+        state = {k: {name: tensors[f"adam.{k}.{name}"] for name in _ADAM} for k in updated}
         self._optimiser.load_state_dict({**self._optimiser.state_dict(), "state": state})
 
 

@@ -12,7 +12,6 @@ from uuv_marl.baselines.learned.checkpoint import Card
 from uuv_marl.baselines.making import compose, make_policy
 from uuv_marl.baselines.policy import Policy, part_of, parts_of
 from uuv_marl.envs.core import BatchedEnv
-from uuv_marl.errors import PolicyError, TrainingError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged
@@ -65,10 +64,7 @@ class Group:
         self._shape, self._state = (part.worlds, part.vehicles), training.critic == "pooled"
         self.collision_cost = 0.0
         """Cost of a collision beyond the reward."""
-        try:
-            self._expert = make_policy(training.expert, scenario, part.worlds) if training.expert else None
-        except PolicyError as error:
-            raise TrainingError(f"expert = {training.expert!r} can't run on {part.name}: {error}") from None
+        self._expert = make_policy(training.expert, scenario, part.worlds) if training.expert else None
         self.expert_share = 1.0
         """Share of the worlds that start in which the expert acts."""
         self._expert_acts = np.ones(part.worlds, np.bool_)
@@ -155,15 +151,10 @@ class Rows:
             started = group.start([int(seed) for seed in seeds(len(worlds))], worlds)
             self.observation[rows] = group.seen(started)
 
-    def set_collision_cost(self, collision_cost: float) -> None:
-        """Set the cost of a collision beyond the reward."""
+    def schedule(self, collision_cost: float, expert_share: float) -> None:
+        """Set the cost of a collision beyond the reward, and the share of starting worlds in which the expert acts."""
         for group in self.groups:
-            group.collision_cost = collision_cost
-
-    def set_expert_share(self, share: float) -> None:
-        """Set the share of the worlds that start in which the expert acts."""
-        for group in self.groups:
-            group.expert_share = share
+            group.collision_cost, group.expert_share = collision_cost, expert_share
 
     def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
         """The expert's actions, and the actions to execute where the network's are ``action``; all (row, 2)."""

@@ -9,14 +9,13 @@ import math
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import safetensors.numpy
-from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
@@ -25,7 +24,7 @@ from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import conditions
 from uuv_marl.train.curve import draw_curve
-from uuv_marl.train.folder import Record, Say, Stop, TrainingFolder, opened, quiet, versions
+from uuv_marl.train.folder import Record, Say, Stop, TrainingFolder, opened, versions
 from uuv_marl.train.objective import objective
 from uuv_marl.train.ppo import Learner, annealed
 from uuv_marl.train.rows import TRAINING_SEEDS, Rows
@@ -43,7 +42,7 @@ _LEARNER_FILE, _WORLDS_FILE, _RANDOM_FILE = "learner.safetensors", "worlds.safet
 
 
 def train(
-    output: UserPath, training: Training | None = None, *, say: Say = quiet, stop: Stop = lambda: False
+    output: UserPath, training: Training | None = None, *, say: Say = lambda _: None, stop: Stop = lambda: False
 ) -> Iterator[Record]:
     """Train until the budget is spent; yields a record after each iteration.
 
@@ -60,14 +59,14 @@ def train(
     Raises:
         ResultsError: the folder is in use or can't be written; the last checkpoint stays complete.
         RewardError: the reward can't be imported, or returns an invalid value.
-        TrainingError: the expert can't run on a scenario.
+        PolicyError: the expert can't run on a scenario.
     """
     with opened(user_path(output), training or Training(), say) as folder:
         yield from _run(folder, folder.until, say, stop)
 
 
 def resume(
-    output: UserPath, until: float | None = None, *, say: Say = quiet, stop: Stop = lambda: False
+    output: UserPath, until: float | None = None, *, say: Say = lambda _: None, stop: Stop = lambda: False
 ) -> Iterator[Record]:
     """Continue a training; yields a record after each iteration.
 
@@ -140,26 +139,24 @@ class Trainer:
         started, config = time.process_time(), self.training.ppo
         share = before.spent(self.training) / self.training.budget
         imitation_share = self.training.imitation_share if self.training.expert else 0.0
-        self.learner.set_imitation(
-            share < imitation_share, self.training.imitation_weight if share >= imitation_share else 0.0
-        )
-        if self.learner.imitating:
-            self.rows.set_expert_share((_NETWORK_ACTS - share / imitation_share) / (_NETWORK_ACTS - _EXPERT_ACTS))
+        imitating = share < imitation_share
+        self.learner.set_imitation(imitating, 0.0 if imitating else self.training.imitation_weight)
+        if imitating:
+            expert_share = (_NETWORK_ACTS - share / imitation_share) / (_NETWORK_ACTS - _EXPERT_ACTS)
             noise, rate, share = _IMITATION_NOISE, annealed(_IMITATION_RATE, share / imitation_share), 0.0
         else:
-            self.rows.set_expert_share(0.0)
-            share = (share - imitation_share) / (1.0 - imitation_share)
+            expert_share, share = 0.0, (share - imitation_share) / (1.0 - imitation_share)
             noise, rate = annealed(config.noise, share), annealed(config.learning_rate, share)
-        self.rows.set_collision_cost(annealed(config.collision_cost or (0.0, 0.0), share))
+        self.rows.schedule(annealed(config.collision_cost or (0.0, 0.0), share), expert_share)
         batch, reward = self.learner.sample(self.rows, noise)
-        update = self.learner.update(batch, noise, rate)
+        kl, explained = self.learner.update(batch, noise, rate)
         return Record(
             iteration=before.iteration + 1,
             agent_steps=before.agent_steps + int(batch.acted.sum()),
             seconds=before.seconds + time.process_time() - started,
             reward=reward,
-            kl=update.kl,
-            explained=update.explained,
+            kl=kl,
+            explained=explained,
             best=before.best,
         )
 
@@ -169,8 +166,7 @@ class Trainer:
         self.save_policy(folder, record)
         (folder / _LEARNER_FILE).write_bytes(safetensors.numpy.save(self.learner.arrays()))
         (folder / _WORLDS_FILE).write_bytes(safetensors.numpy.save(self.rows.snapshot()))
-        random = json.dumps(self._rng.bit_generator.state)
-        (folder / _RANDOM_FILE).write_text(random + "\n", encoding="utf-8")
+        (folder / _RANDOM_FILE).write_text(json.dumps(self._rng.bit_generator.state) + "\n", encoding="utf-8")
 
     def save_policy(self, folder: Path, record: Record, validation: Validation | None = None) -> None:
         """Write the policy with the training's settings, versions and record."""
@@ -183,7 +179,10 @@ class Trainer:
     def restore(self, folder: Path) -> None:
         """Restore exactly what ``save`` wrote. Raises ResultsError that names a damaged file."""
         with _reading(folder / _LEARNER_FILE) as data:
-            self.learner.restore(_learned(data))
+            arrays = safetensors.numpy.load(data)
+            if spoilt := next((name for name, array in arrays.items() if not np.isfinite(array).all()), None):
+                raise ValueError(f"{spoilt} must hold finite numbers")
+            self.learner.restore(arrays)
         with _reading(folder / _WORLDS_FILE) as data:
             self.rows.restore(safetensors.numpy.load(data))
         with _reading(folder / _RANDOM_FILE) as data:
@@ -247,11 +246,3 @@ def _reading(path: Path) -> Iterator[bytes]:
             f"{path} can't be used ({type(error).__name__}: {reason}); copy the whole checkpoint again, or "
             "start again with another --output"
         ) from error
-
-
-def _learned(data: bytes) -> Mapping[str, NDArray[Any]]:
-    arrays = safetensors.numpy.load(data)
-    spoilt = [name for name, array in arrays.items() if not np.isfinite(array).all()]
-    if spoilt:
-        raise ValueError(f"{spoilt[0]} must hold finite numbers")
-    return arrays

@@ -1,11 +1,11 @@
 """``Training``: the description of a training, read from a TOML recipe and saved in a run's ``config.json``."""
 
-import tomllib
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Annotated, Any, Literal, NamedTuple, Self, cast
 
 import pydantic
+from pydantic import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import Card, card_of
@@ -17,6 +17,7 @@ from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingErr
 from uuv_marl.modules import named_object
 from uuv_marl.paths import user_path
 from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.scenario.documents import read_toml
 from uuv_marl.scenario.messages import explain
 from uuv_marl.scenario.overrides import assign, plain
 
@@ -29,11 +30,7 @@ COLLISION_COST = (1.0, 300.0)
 ROWS = 640
 """Approximate number of vehicles that are simulated together."""
 
-Count = Annotated[int, pydantic.Field(ge=1)]
-Whole = Annotated[int, pydantic.Field(ge=0)]
 Share = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
-Positive = Annotated[float, pydantic.Field(gt=0.0)]
-NotNegative = Annotated[float, pydantic.Field(ge=0.0)]
 
 
 def _paired(sizes: Any) -> Any:
@@ -63,25 +60,25 @@ class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     """Discount per decision; with 0.5 s rewards fade over 50 s."""
     gae_lambda: Share = 0.95
     """Weight of longer returns in advantages [1]."""
-    horizon: Count = 64
+    horizon: PositiveInt = 64
     """Decisions between updates, and length of backpropagation through time."""
-    minibatches: Count = 10
+    minibatches: PositiveInt = 10
     """Gradient steps of an epoch, at most."""
-    epochs: Count = 4
+    epochs: PositiveInt = 4
     """Passes over a batch, at most."""
-    clip: Positive = 0.2
+    clip: PositiveFloat = 0.2
     """Clip range of PPO's ratio [1]."""
-    kl_stop: Positive = 0.03
+    kl_stop: PositiveFloat = 0.03
     """Divergence from the policy that sampled, beyond which no further epoch runs."""
-    learning_rate: tuple[Positive, Positive] = (1e-3, 1e-4)
+    learning_rate: tuple[PositiveFloat, PositiveFloat] = (1e-3, 1e-4)
     """At the start and at the end."""
-    noise: tuple[Positive, Positive] = (0.5, 0.1)
+    noise: tuple[PositiveFloat, PositiveFloat] = (0.5, 0.1)
     """Standard deviation of actions [1], at the start and at the end. Actions are clipped at full force, and a policy
     that learns to compensate for this overshoots without noise: end with a small value."""
-    collision_cost: tuple[NotNegative, NotNegative] | None = None
+    collision_cost: tuple[NonNegativeFloat, NonNegativeFloat] | None = None
     """Cost of a collision beyond the reward, at the start and at the end, see ``annealed``. If None: ``COLLISION_COST``
     with the package's tasks and rewards; 0 with a task or reward of your own."""
-    max_gradient: Positive = 0.5
+    max_gradient: PositiveFloat = 0.5
     """Norm to which the gradients of actor and critic are clipped."""
     value_decay: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.99
     """Decay of the running mean and variance that normalise returns [1]."""
@@ -104,7 +101,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     """Further scenarios for the same network, in equal parts, with the same observation, vehicle and clock."""
     overrides: dict[str, Any] = {}
     """Changed fields of ``scenario``; ``OVERRIDES`` apply to fields that are not given."""
-    sizes: Annotated[tuple[tuple[Count, Whole], ...], pydantic.BeforeValidator(_paired)] = ()
+    sizes: Annotated[tuple[tuple[PositiveInt, NonNegativeInt], ...], pydantic.BeforeValidator(_paired)] = ()
     """Pairs of numbers of vehicles and worlds, or numbers of vehicles; the scenario's own if empty. Without a number of
     worlds, or with 0, each size gets about the same number of vehicles, ``ROWS`` in total."""
     reward: str | None = None
@@ -124,21 +121,21 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     takes over the acting, with the expert's actions as targets (as in DAgger, Ross et al. 2011)."""
     imitation_share: Annotated[float, pydantic.Field(ge=0.0, lt=1.0)] = 0.4
     """Share of the budget for imitation, if there is an expert; PPO starts after it."""
-    imitation_weight: NotNegative = 0.0
+    imitation_weight: NonNegativeFloat = 0.0
     """Weight in PPO's loss of the mean squared distance from the expert's actions [1]."""
     ppo: Ppo = Ppo()
     """Hyperparameters of PPO."""
-    minutes: Positive | None = None
+    minutes: PositiveFloat | None = None
     """Budget of processor time without validations; 5 if neither this nor ``steps`` is given."""
-    steps: Count | None = None
+    steps: PositiveInt | None = None
     """Budget of agent-steps (decisions of one vehicle), which gives the same training on every run."""
-    seed: int = pydantic.Field(0, ge=0)
+    seed: NonNegativeInt = 0
     """Seed of weights, worlds and noise; determines a training that has ``steps``."""
-    validations: Count = 15
+    validations: PositiveInt = 15
     """Number of validations, at equal parts of the budget."""
-    validation_episodes: Count = 16
+    validation_episodes: PositiveInt = 16
     """Episodes of a validation, over all sizes."""
-    checkpoint_every: Count = 20
+    checkpoint_every: PositiveInt = 20
     """Iterations between checkpoints."""
 
     def __init__(self, **fields: Any) -> None:
@@ -264,23 +261,10 @@ def recipe_fields(name: str) -> dict[str, Any]:
     A recipe names its ``scenario``; no scenario's file does.
 
     Raises:
-        TrainingError: it can't be read.
+        ScenarioError: it can't be read.
     """
-    if not name.endswith(".toml"):
-        return {"scenario": name}
-    try:
-        fields = tomllib.loads(user_path(name).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise TrainingError(
-            f"{name} can't be read ({error.strerror}); give a scenario's name, or a TOML file of a scenario or training"
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise TrainingError(f"{name} is not valid TOML ({error}); correct it there") from None
+    fields = read_toml(user_path(name)).data if name.endswith(".toml") else {}
     return fields if "scenario" in fields else {"scenario": name}
-
-
-TABLES = ("ppo", "network")
-"""Fields that are tables."""
 
 
 def changed_fields(fields: dict[str, Any], changes: Mapping[str, object]) -> dict[str, Any]:
@@ -292,7 +276,7 @@ def changed_fields(fields: dict[str, Any], changes: Mapping[str, object]) -> dic
     """
     for field, value in changes.items():
         table, dot, _ = field.partition(".")
-        if table in (TABLES if dot else Training.model_fields):
+        if table in (("ppo", "network") if dot else Training.model_fields):
             assign(fields, field, value)
         else:
             fields.setdefault("overrides", {})[field] = value

@@ -1,7 +1,6 @@
 """Validation of a policy: deterministic episodes on validation seeds, run by the benchmark."""
 
 import json
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,7 +11,7 @@ from uuv_marl.replay.command import command
 from uuv_marl.scenario import load_scenario
 from uuv_marl.scenario.overrides import leaves
 from uuv_marl.train.rows import TRAINING_SEEDS
-from uuv_marl.train.training import Part, Training, overrides_for
+from uuv_marl.train.training import Training, overrides_for
 
 VALIDATION_SEEDS = TRAINING_SEEDS[1]
 """First validation seed; training uses none from here to 999,999."""
@@ -51,7 +50,8 @@ def validate(policy: str, training: Training) -> Validation:
     """Run a policy, by its name or path, on the validation seeds with each scenario and size of a training."""
     number = max(1, training.validation_episodes // len(training.parts))
     seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + number)
-    runs = [(part, run) for part in training.parts for run in _runs(policy, part, seeds)]
+    runs = [(part, run) for part in training.parts
+            for run in episodes(with_policy_requirements(policy, part.scenario), policy, seeds)]  # fmt: skip
     shares, swarm_success = zip(
         *(shares_of(run.metrics, part.scenario.task_class.headline) for part, run in runs), strict=True
     )
@@ -65,10 +65,6 @@ def validate(policy: str, training: Training) -> Validation:
         time_s=sum(times) / len(times) if times else None,
         worst=Worst(part.name, part.vehicles, run.seed),
     )
-
-
-def _runs(policy: str, part: Part, seeds: Sequence[int]) -> Iterator[Run]:
-    return episodes(with_policy_requirements(policy, part.scenario), policy, seeds)
 
 
 def _end_s(run: Run) -> float:
