@@ -17,7 +17,6 @@ from typer.testing import CliRunner
 from tests.processes import SETS, cli, quick
 from tests.swarms import piloted, run_of
 from uuv_marl.benchmark import runner
-from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
 from uuv_marl.replay import encode
 from uuv_marl.replay.encode import CODINGS, payload, unwrapped
@@ -206,25 +205,8 @@ def test_the_command_shows_policies_side_by_side(tmp_path, monkeypatch, written)
     assert re.fullmatch(r"single_obstacle\.idle-sdc\.3\.[0-9a-f]{8}\.html", path.name)
     assert path.parent == Path("results/replay")
     assert f"Replay: {path}" in text
-
-
-def test_the_command_shows_the_runs_of_a_benchmark(tmp_path, monkeypatch, written):
-    monkeypatch.chdir(tmp_path)
-    scenario = quick("lossy", **{"losses.times_s": [2.0]})
-    results = Results("out", [scenario])
-    runner.run_missing(results, [scenario], ["idle", "random"], [0, 1], lambda *a: None)
-    for arguments in ([], ["--scenario=lossy", "--seed=1", "--inspect=0"]):
-        code, text = replay("out", "--policy=random", "--policy=idle", "--output=below/x.GIF", *arguments)
-        assert code == 0, text
-        recordings, path, _ = written[-1]
-        assert path == Path("below/x.GIF")
-        assert [one.metrics for one in recordings] == [
-            row.metrics for name in ("random", "idle") for row in results.select("lossy", name, [recordings[0].seed])
-        ]
-    assert recordings[0].seed == 1
-    assert replay("out")[0] == 0
-    assert [one.policy for one in written[-1][0]] == ["idle", "random"]
-    assert "holds no 'starter' but lossy; choose with --scenario" in replay("out", "--scenario=starter")[1]
+    assert replay("--output=below/x.GIF", *SETS)[0] == 0
+    assert written[-1][1] == Path("below/x.GIF")
 
 
 def test_a_page_s_name_tells_changes_apart(tmp_path, monkeypatch, written):
@@ -248,14 +230,13 @@ def test_a_page_s_name_tells_changes_apart(tmp_path, monkeypatch, written):
         (["--inspect=1", "--inspect=2", "--output=x.mp4"], "a film shows the sonar of one vehicle, got 2"),
         ([f"--policy={name}" for name in ("idle", "random", "sff", "sdc", "mappo")], "at most 4 policies"),
         (["--set=sonar.channels=[]"], "every policy has its own"),
-        (["nowhere"], "nowhere/results.json can't be read (No such file or directory); give the folder of a benchmark"),
     ],
 )
 def test_mistakes_are_explained_before_anything_is_simulated(arguments, message, tmp_path, monkeypatch, written):
     monkeypatch.chdir(tmp_path)
     Path("folder.html").mkdir()
     monkeypatch.setattr("uuv_marl.replay.record.record", lambda *a: pytest.fail("simulated"))
-    own = arguments[0].startswith("nowhere") or any("num_vehicles" in argument for argument in arguments)
+    own = any("num_vehicles" in argument for argument in arguments)
     code, text = replay(*([] if own else SETS), *arguments)
     assert code == 2, text
     assert message in text

@@ -3,7 +3,7 @@
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,7 +12,6 @@ from uuv_marl.cli.console import (
     explained,
     find_modules,
     overrides_option,
-    path_argument,
     path_option,
     progress_bar,
     progress_line,
@@ -25,22 +24,14 @@ if TYPE_CHECKING:
 
     from uuv_marl.replay.recording import Recording
 
-_SCENARIO, _POLICY = "single_obstacle", "bio_inspired"
-
 
 def replay(
-    run: Annotated[
-        Path | None,
-        path_argument("Folder of a benchmark, whose scenarios and policies are taken instead of named ones."),
-    ] = None,
-    scenario: Annotated[
-        str | None, typer.Option(help=f"Name or TOML file. Default: {_SCENARIO}, or the folder's first.")
-    ] = None,
+    scenario: Annotated[str, typer.Option(help="Name or TOML file.")] = "single_obstacle",
     policy: Annotated[
         list[str] | None,
         typer.Option(
             help="Name, checkpoint (runs/starter/best) or module:Class. Repeat it for up to four side by side. "
-            f"Default: {_POLICY}, or the folder's first four."
+            "Default: bio_inspired."
         ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the episode, for all policies.")] = 0,
@@ -48,7 +39,7 @@ def replay(
         list[int] | None,
         typer.Option(min=0, metavar="VEHICLE", help="Show this vehicle's sonar too. Repeat it for up to eight."),
     ] = None,
-    overrides: Annotated[list[str] | None, overrides_option("swarm.num_vehicles=200")] = None,
+    overrides: Annotated[list[str] | None, overrides_option("`swarm.num_vehicles=200`")] = None,
     output: Annotated[
         Path | None,
         path_option("A page (.html), a film (.mp4, .gif) or a picture (.png). Default: a page in results/replay."),
@@ -60,21 +51,18 @@ def replay(
 
     Example: uuv-marl replay --policy bio_inspired --policy sff --seed 3 --inspect 7
 
-    Example: uuv-marl replay results/benchmark --policy sff --output sff.mp4
+    Example: uuv-marl replay --policy sff --output sff.mp4
     """
     with explained():
         from uuv_marl.errors import ReplayError
 
         is_film = _is_film(output, inspect or [])
-        policies = list(dict.fromkeys(policy or []))
+        policies = list(dict.fromkeys(policy or ["bio_inspired"]))
         if len(policies) > MOST_EPISODES:
             raise ReplayError(f"at most {MOST_EPISODES} policies can be shown side by side, got {len(policies)}")
-        start, policies = (
-            (scenario or _SCENARIO, policies or [_POLICY]) if run is None else _saved(run, scenario, policies)
-        )
         try:
             with progress_bar() as bar:
-                recordings = _simulated(start, policies, seed, inspect or [], overrides or [], bar)
+                recordings = _simulated(scenario, policies, seed, inspect or [], overrides or [], bar)
                 path = output or _ready(_default(recordings, overrides or []))
                 report = progress_line(bar, "writing")
                 if is_film:
@@ -132,16 +120,15 @@ def _default(recordings: "Sequence[Recording]", overrides: Sequence[str]) -> Pat
 
 
 def _simulated(
-    start: str | dict[str, Any], policies: Sequence[str], seed: int, inspect: Sequence[int], overrides: Sequence[str],
-    bar: "Progress",
+    name: str, policies: Sequence[str], seed: int, inspect: Sequence[int], overrides: Sequence[str], bar: "Progress"
 ) -> "list[Recording]":  # fmt: skip
     """An episode of each policy on the same seed; errors of all are raised before the first is simulated."""
     from uuv_marl.baselines import make_policy, with_policy_requirements
     from uuv_marl.replay.record import checked, record
     from uuv_marl.scenario import load_scenario
 
-    find_modules([str(start), *policies, *overrides])
-    scenario = load_scenario(start, overrides=changes_of(overrides))
+    find_modules([name, *policies, *overrides])
+    scenario = load_scenario(name, overrides=changes_of(overrides))
     checked(inspect, scenario)
     for policy in policies:
         make_policy(policy, with_policy_requirements(policy, scenario))
@@ -151,18 +138,3 @@ def _simulated(
         recordings.append(record(scenario, policy, seed, inspect, report))
         report(1.0)
     return recordings
-
-
-def _saved(folder: Path, scenario: str | None, policies: Sequence[str]) -> tuple[dict[str, Any], Sequence[str]]:
-    """A scenario of a benchmark's folder, and policies, by default the first ones."""
-    from uuv_marl.benchmark.results import FILE, read_content, source_fingerprint
-    from uuv_marl.errors import ReplayError
-
-    content = read_content(folder / FILE, "give the folder of a benchmark, or --scenario and --policy alone")
-    if content["fingerprint"] != source_fingerprint():
-        say(f"{folder} comes from other code of uuv_marl, so that an episode may differ from the saved one.")
-    scenarios = content["scenarios"]
-    name = scenario or min(scenarios, default="")
-    if name not in scenarios:
-        raise ReplayError(f"{folder} holds no {name!r} but {', '.join(sorted(scenarios))}; choose with --scenario")
-    return scenarios[name], policies or sorted(content["policies"])[:MOST_EPISODES] or [_POLICY]
