@@ -29,27 +29,20 @@ def save_sb3(model: PPO, path: UserPath) -> None:
     normalised = model.get_vec_normalize_env()
     while env is not None and not isinstance(env, SwarmVecEnv):
         env = getattr(env, "venv", None)
-    if env is None or env.observes_positions or (normalised is not None and normalised.norm_obs):
+    changed = normalised is not None and normalised.norm_obs
+    if env is None or env.observes_positions or changed or model.observation_space != env.observation_space:
         raise PolicyError(
             "the model must see what a checkpoint's network sees; train on SwarmVecEnv(..., observe='closeness'), "
-            "without normalised observations"
+            "without normalised observations and VecFrameStack"
         )
     policy: Any = model.policy
     hidden = list(policy.mlp_extractor.policy_net)
-    inputs = model.observation_space.shape
-    if type(policy.features_extractor) is not FlattenExtractor or policy.squash_output:
+    plain = type(policy.features_extractor) is FlattenExtractor and not policy.squash_output
+    if not plain or not hidden or [type(layer) for layer in hidden] != [nn.Linear, nn.Tanh] * (len(hidden) // 2):
         raise PolicyError(
-            "a checkpoint's network is the actor alone; leave features_extractor_class and squash_output out"
+            f"a checkpoint's network has tanh layers before its last, and nothing else, got {model.policy_kwargs}; "
+            "leave activation_fn, features_extractor_class, squash_output and net_arch=[] out"
         )
-    if inputs != env.observation_space.shape:
-        raise PolicyError(
-            f"a checkpoint's network sees one observation of {env.observation_space.shape}, got {inputs}; leave "
-            "VecFrameStack out"
-        )
-    if not hidden:
-        raise PolicyError("a checkpoint's network has a layer before its last, got net_arch=[]; give one")
-    if [type(layer) for layer in hidden] != [nn.Linear, nn.Tanh] * (len(hidden) // 2):
-        raise PolicyError(f"a checkpoint's network has tanh layers, got {hidden}; leave activation_fn out")
     layers = [*hidden[::2], policy.action_net]
     tensors = {f"{k}.weight": layer.weight.detach().cpu().numpy().T for k, layer in enumerate(layers)}
     tensors |= {f"{k}.bias": layer.bias.detach().cpu().numpy() for k, layer in enumerate(layers)}
