@@ -145,7 +145,6 @@ def _batch(
     if watch:
         watch(swarm, None)
     diverged: list[str] = []
-    report_every = max(1, round(2.0 / period))
     share = lambda: float(np.where(active, swarm.facts.time_s, limits).sum() / limits.sum())  # noqa: E731
     while active.any():
         action = actor.act(percept)
@@ -173,7 +172,6 @@ def _batch(
         actor.active[:] = active
         if step % every == 0:
             samples.append(_sample(swarm))
-        if step % report_every == 0:
             report(share())
     if diverged:
         raise DivergenceError("; ".join(diverged))

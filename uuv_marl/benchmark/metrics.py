@@ -20,7 +20,7 @@ class Metrics(Measures, Success):
 
 
 def measure(swarm: Swarm) -> dict[str, Float64]:
-    """Measures of a swarm in its current state, shape (world,) each; docs/benchmark.md defines them."""
+    """Measures of a swarm in its current state, (world,) or (world, obstacle); docs/benchmark.md defines them."""
     facts, state, constraints = swarm.facts, swarm.state, swarm.scenario.constraints
     alive = state.alive
     living = np.maximum(alive.sum(axis=1), 1)
@@ -41,6 +41,7 @@ def measure(swarm: Swarm) -> dict[str, Float64]:
         **{name: (any_alive & holds).astype(np.float64) for name, holds in within.items()},
         "effort": (facts.effort * alive).sum(axis=1) / living,
         "saturation": facts.saturated.copy(),
+        "obstacle_distance_m": facts.obstacle_clearance.copy(),
     }
 
 
@@ -50,30 +51,26 @@ class MetricsRecorder:
     def __init__(self, swarm: Swarm) -> None:
         self._swarm = swarm
         self._samples: list[dict[str, Float64]] = []
-        self._clearances: list[Float64] = []
         self._collisions = np.zeros(swarm.num_worlds, np.int64)
         self._success = SuccessRecorder(swarm) if isinstance(swarm.task, Follow) else None
 
     def update(self, active: Bool) -> None:
         """Measure the swarm after a reset or step of the ``active`` worlds."""
         self._samples.append(measure(self._swarm))
-        self._clearances.append(self._swarm.facts.obstacle_clearance.copy())
         self._collisions += np.where(active, self._swarm.facts.collisions, 0)
         if self._success:
             self._success.update(active)
 
     def series(self, world: int) -> dict[str, Float32]:
-        """A world's samples over time: those of ``measure``, and ``obstacle_distance_m`` (time, obstacle)."""
+        """A world's samples over time: those of ``measure``."""
         columns = {name: values.astype(np.float32) for name, values in self._table(world).items()}
         num = int(self._swarm.world_map.num_obstacles[world])
-        distances = np.array([clearance[world, :num] for clearance in self._clearances], np.float32)
-        return {**columns, "obstacle_distance_m": distances.reshape(len(self._samples), num)}
+        return columns | {"obstacle_distance_m": columns["obstacle_distance_m"][:, :num].copy()}
 
     def metrics(self, world: int, clamps: int) -> Metrics:
         """A world's metrics, as in ``results.json``; None for values that do not exist."""
         facts = self._swarm.facts
         table = self._table(world)
-        clearance = min(float(clearance[world].min()) for clearance in self._clearances)
         all_three = table["within_s_l"] * table["within_s_o"] * table["within_s_u"]
         own = _own(self._swarm.task, world)
         judged = self._success.metrics(world) if self._success else Success()
@@ -85,7 +82,7 @@ class MetricsRecorder:
             "time_within_5_m_s": within_5_m,
             "time_within_10_m_s": within_10_m,
             "duration_s": float(self._swarm.duration_s[world]),
-            "min_obstacle_distance_m": _number(clearance),
+            "min_obstacle_distance_m": _number(table["obstacle_distance_m"].min()),
             "min_spacing_m": _number(table["min_spacing_m"].min()),
             "mean_min_spacing_m": _mean(table["min_spacing_m"]),
             "max_spacing_m": _number(
@@ -111,7 +108,7 @@ class MetricsRecorder:
         return metrics
 
     def _table(self, world: int) -> dict[str, Float64]:
-        """A world's samples over time, shape (time,) each."""
+        """A world's samples over time, shape (time,) or (time, obstacle) each."""
         return {name: np.array([sample[name][world] for sample in self._samples]) for name in self._samples[0]}
 
 

@@ -127,8 +127,6 @@ class Results:
         self._route_seeds = route_seeds
         self._fingerprint, self._versions = source_fingerprint(), _versions() | _tasks(self.scenarios.values())
         self._runs: dict[tuple[str, str, int], Metrics] = {}
-        self._untraced: set[tuple[str, str, int]] = set()
-        """Runs whose time series are missing."""
         self._path = folder / FILE
         with writing(folder):
             (folder / "traces" if traces else folder).mkdir(parents=True, exist_ok=True)
@@ -153,8 +151,6 @@ class Results:
         self._dumps = {**content["scenarios"], **self._dumps}
         self._versions = content["versions"] | self._versions
         self._runs = {row[:3]: row.metrics for row in content["runs"]}
-        if self._traces:
-            self._untraced = {key for key in self._runs if not zipfile.is_zipfile(self.trace_path(*key))}
 
     @property
     def rows(self) -> list[ResultRow]:
@@ -179,7 +175,7 @@ class Results:
     def has(self, scenario: str, policy: str, seed: int) -> bool:
         """Whether this run and its time series exist."""
         key = scenario, policy, seed
-        return key in self._runs and key not in self._untraced
+        return key in self._runs and (not self._traces or zipfile.is_zipfile(self.trace_path(*key)))
 
     def add(self, scenario: str, policy: str, run: Run) -> None:
         """Write a run to disk. Raises ResultsError if the policy's file has changed."""
@@ -187,7 +183,6 @@ class Results:
         if self._traces:
             self._add_trace(self.trace_path(scenario, policy, run.seed), run)
         self._runs[scenario, policy, run.seed] = run.metrics
-        self._untraced.discard((scenario, policy, run.seed))
         content = Content(
             schema=2,
             fingerprint=self._fingerprint,
@@ -252,18 +247,16 @@ def load_trace(path: UserPath) -> Trace:
 
 def policy_info(policy: str) -> PolicyInfo:
     """Requirements of a policy as tables and results show them, and a hash of its file, if it is a user's."""
-    policy_type = policy_class(policy)
-    if isinstance(policy_type, Trained):
-        source = policy_type.checkpoint.digest
-    else:
-        source = _file_hash(policy_type) if ":" in policy else None
-    required = policy_requirements(policy)
+    policy_type, required = policy_class(policy), policy_requirements(policy)
     damping = required.yaw_damping_nms * (FULL_TORQUE_NM / required.full_torque_nm)
-    known = PolicyInfo(channels=list(required.channels), yaw_damping_nms=damping, source=source)
+    known = PolicyInfo(channels=list(required.channels), yaw_damping_nms=damping, source=None)
     if required.decision_period_s:
         known["decision_period_s"] = required.decision_period_s
     if isinstance(policy_type, Trained):
+        known["source"] = policy_type.checkpoint.digest
         known["policy_class"] = policy_type.checkpoint.card.policy_class
+    elif ":" in policy:
+        known["source"] = _file_hash(policy_type)
     return known
 
 

@@ -3,8 +3,7 @@
 # pyright: reportUnknownMemberType=false
 # Matplotlib leaves the types of its keyword arguments open.
 
-from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +25,9 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 BLUE, ORANGE, GREEN, PINK, AMBER, SKY, BLACK, GREY = COLOURS
 
 
-@contextmanager
-def house_style() -> Generator[None]:
-    """Apply ``house.mplstyle`` in the block; Matplotlib's settings are restored afterwards."""
-    with matplotlib.style.context(["default", "uuv_marl.benchmark.house"]):
-        yield
+def house_style() -> AbstractContextManager[None]:
+    """A context with ``house.mplstyle``; Matplotlib's settings are restored afterwards."""
+    return matplotlib.style.context(["default", "uuv_marl.benchmark.house"])
 
 
 def panels(

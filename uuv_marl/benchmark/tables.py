@@ -82,7 +82,7 @@ def _row(scenario: Scenario, runs: Sequence[ResultRow], info: PolicyInfo) -> dic
         return f"{pick(values(metric)):{spec}}" if values(metric) else NOTHING
 
     def mean(metric: str, spec: str) -> str:
-        return estimate_text(values(metric), spec)
+        return f"{estimate(values(metric), fewest=FEWEST):{spec}}" if values(metric) else NOTHING
 
     counts = values("collisions")
     collisions = f"{sum(counts)} in {counted(sum(map(bool, counts)), 'seed')}" if any(counts) else "0"
@@ -112,11 +112,6 @@ def _row(scenario: Scenario, runs: Sequence[ResultRow], info: PolicyInfo) -> dic
         "collisions": collisions,
         **({"paper": _paper_cell(figure)} if follows else {}),
     }
-
-
-def estimate_text(sample: Sequence[float], spec: str) -> str:
-    """An estimate as text, each number as ``spec`` says: without interval for few values, a dash for none."""
-    return f"{estimate(sample, fewest=FEWEST):{spec}}" if sample else NOTHING
 
 
 def counted(number: int, what: str) -> str:

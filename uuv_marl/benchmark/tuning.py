@@ -1,6 +1,5 @@
 """Fair tuning: the same optimiser, evaluations, seeds and objective for every controller with free gains."""
 
-import csv
 import json
 import logging
 import tomllib
@@ -10,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from uuv_marl.atomic import replacing, write_text
+from uuv_marl.atomic import write_text
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.comparators import apf, leader_follower, olfati_saber, orca
@@ -210,11 +209,9 @@ def tune(policy: str, output: UserPath, trials: int, report: Callable[[int, floa
         "best": best.params,  # in full: rounded parameters can give another run, with a collision
         "best_cost_s": round(best.values[0], 3),
     }
-    trials_path, path = output / f"{name}.csv", output / f"{name}.json"
-    with replacing(trials_path) as partial_path, partial_path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["cost_s", *space.free])
-        for trial in finished:
-            writer.writerow([f"{trial.values[0]:.3f}", *(trial.params[name] for name in space.free)])
+    path = output / f"{name}.json"
+    rows = [[f"{trial.values[0]:.3f}", *(trial.params[free] for free in space.free)] for trial in finished]
+    lines = [",".join(map(str, row)) for row in [["cost_s", *space.free], *rows]]
+    write_text(path.with_suffix(".csv"), "\n".join(lines) + "\n")
     write_text(path, json.dumps(result, indent=1) + "\n")
     return path
