@@ -178,6 +178,4 @@ def _band(series: Sequence[tuple[Float32, Float32]]) -> tuple[Float64, ...]:
     curves = np.array([np.interp(grid, time, values, right=np.nan) for time, values in series])
     most = np.isfinite(curves).sum(axis=0) > len(series) / 2
     curves = curves[:, most]
-    if not curves.size:
-        return grid[most], grid[most], grid[most], grid[most]
     return grid[most], np.nanmin(curves, axis=0), np.nanmedian(curves, axis=0), np.nanmax(curves, axis=0)

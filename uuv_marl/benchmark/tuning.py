@@ -43,25 +43,14 @@ OBJECTIVES = (
 """Objectives of the paper's task, of tasks with goals, and of the task with targets."""
 
 
-class Range(NamedTuple):
-    """Range of a parameter. The search starts in the middle, which was found by hand to work."""
-
-    low: float
-    high: float
-    log: bool = False
-
-
-_RANGES = {
-    name: {free: Range(**bounds) for free, bounds in table.items()}
-    for name, table in tomllib.loads(Path(__file__).with_name("spaces.toml").read_text(encoding="utf-8")).items()
-}
+_RANGES: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("spaces.toml").read_text(encoding="utf-8"))
 
 
 class Space(NamedTuple):
     """A search space, and its scenario."""
 
-    free: dict[str, Range]
-    """Free parameters."""
+    free: dict[str, Any]
+    """Ranges of the free parameters: keyword arguments of Optuna's ``suggest_float``."""
     gains: Callable[..., Any]
     """From their values to the policy's gains."""
     scenario: str = SCENARIO
@@ -190,7 +179,7 @@ def tune(policy: str, output: UserPath, trials: int, report: Callable[[int, floa
     seeds = SEEDS if not own_task else MAPS[: FEWER.get(where, len(MAPS))]
 
     def objective(trial: optuna.Trial) -> float:
-        drawn = {name: trial.suggest_float(name, r.low, r.high, log=r.log) for name, r in space.free.items()}
+        drawn = {name: trial.suggest_float(name, **bounds) for name, bounds in space.free.items()}
         runs = [*episodes(scenario, policy, seeds, **space.parameters(drawn))]
         return sum(tuning_cost(run, scenario) for run in runs) / len(runs)
 
@@ -205,7 +194,7 @@ def tune(policy: str, output: UserPath, trials: int, report: Callable[[int, floa
         "scenario": where,
         "seeds": list(seeds),
         "optimiser": f"Optuna {optuna.__version__}, CmaEsSampler, seeded by the number of trials before",
-        "space": {name: r._asdict() for name, r in space.free.items()},
+        "space": space.free,
         "best": best.params,  # in full: rounded parameters can give another run, with a collision
         "best_cost_s": round(best.values[0], 3),
     }
