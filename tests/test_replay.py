@@ -224,7 +224,6 @@ def test_a_page_s_name_tells_changes_apart(tmp_path, monkeypatch, written):
     ("arguments", "message"),
     [
         (["--output=x.avi"], "--output x.avi must end in .html, .mp4, .gif or .png"),
-        (["--output=folder.html"], "is a folder; give a file in it"),
         (["--inspect=8"], "vehicle 8 can't be inspected: single_obstacle has vehicles 0 to 7"),
         ([f"--inspect={k}" for k in range(8)] + ["--set=swarm.num_vehicles=9", "--inspect=8"], "at most 8 vehicles"),
         (["--inspect=1", "--inspect=2", "--output=x.mp4"], "a film shows the sonar of one vehicle, got 2"),
@@ -234,7 +233,6 @@ def test_a_page_s_name_tells_changes_apart(tmp_path, monkeypatch, written):
 )
 def test_mistakes_are_explained_before_anything_is_simulated(arguments, message, tmp_path, monkeypatch, written):
     monkeypatch.chdir(tmp_path)
-    Path("folder.html").mkdir()
     monkeypatch.setattr("uuv_marl.replay.record.record", lambda *a: pytest.fail("simulated"))
     own = any("num_vehicles" in argument for argument in arguments)
     code, text = replay(*([] if own else SETS), *arguments)
@@ -251,7 +249,7 @@ def test_stopping_writes_nothing(tmp_path, monkeypatch, written):
     monkeypatch.chdir(tmp_path)
     code, text = replay()
     assert code == 130
-    assert text.endswith("Stopped; nothing was written.")
+    assert text.endswith("Stopped. Nothing was written; give the same command to continue.")
     assert not list(tmp_path.iterdir())
 
 

@@ -130,7 +130,7 @@ def working(message: str, alone: Path | None = None) -> Iterator[Progress]:
         with nullcontext() if alone is None else locked(alone), progress_bar() as bar:
             yield bar
     except KeyboardInterrupt:
-        say(f"Stopped. {message}; the same command continues.")
+        say(f"Stopped. {message}; give the same command to continue.")
         raise typer.Exit(130) from None
 
 

@@ -1,6 +1,5 @@
 """``uuv-marl replay``: an episode as a page for the browser, or as a film."""
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,9 +12,9 @@ from uuv_marl.cli.console import (
     find_modules,
     overrides_option,
     path_option,
-    progress_bar,
     progress_line,
     say,
+    working,
 )  # fmt: skip
 from uuv_marl.replay import FILMS, MOST_EPISODES
 
@@ -54,29 +53,28 @@ def replay(
     Example: uuv-marl replay --policy sff --output sff.mp4
     """
     with explained():
+        from uuv_marl.atomic import writing
         from uuv_marl.errors import ReplayError
 
         is_film = _is_film(output, inspect or [])
         policies = list(dict.fromkeys(policy or ["bio_inspired"]))
         if len(policies) > MOST_EPISODES:
             raise ReplayError(f"at most {MOST_EPISODES} policies can be shown side by side, got {len(policies)}")
-        try:
-            with progress_bar() as bar:
-                recordings = _simulated(scenario, policies, seed, inspect or [], overrides or [], bar)
-                path = output or _ready(_default(recordings, overrides or []))
-                report = progress_line(bar, "writing")
-                if is_film:
-                    from uuv_marl.replay.film import write_film
+        with working("Nothing was written") as bar:
+            recordings = _simulated(scenario, policies, seed, inspect or [], overrides or [], bar)
+            path = output or _default(recordings, overrides or [])
+            with writing(path):
+                path.parent.mkdir(parents=True, exist_ok=True)
+            report = progress_line(bar, "writing")
+            if is_film:
+                from uuv_marl.replay.film import write_film
 
-                    write_film(recordings, path, sonar_of=inspect[0] if inspect else None, progress=report)
-                else:
-                    from uuv_marl.replay.page import write_page
+                write_film(recordings, path, sonar_of=inspect[0] if inspect else None, progress=report)
+            else:
+                from uuv_marl.replay.page import write_page
 
-                    write_page(recordings, path)
-                report(1.0)
-        except KeyboardInterrupt:
-            say("Stopped; nothing was written.")
-            raise typer.Exit(130) from None
+                write_page(recordings, path)
+            report(1.0)
         say(f"Replay: {path} ({path.stat().st_size / 1000:,.0f} kB)")
 
 
@@ -87,8 +85,6 @@ def _is_film(output: Path | None, inspect: Sequence[int]) -> bool:
     suffix = ".html" if output is None else output.suffix.lower()
     if suffix not in (".html", *FILMS):
         raise ReplayError(f"--output {output} must end in {', '.join(('.html', *FILMS[:-1]))} or {FILMS[-1]}")
-    if output is not None:
-        _ready(output)
     if suffix == ".html":
         return False
     if len(inspect) > 1:
@@ -97,19 +93,6 @@ def _is_film(output: Path | None, inspect: Sequence[int]) -> bool:
 
     check_format(Path(f"film{suffix}"))
     return True
-
-
-def _ready(output: Path) -> Path:
-    """The path, in a writable folder that is created if missing. Raises ResultsError."""
-    from uuv_marl.atomic import writing
-    from uuv_marl.errors import ReplayError
-
-    if output.is_dir():
-        raise ReplayError(f"--output {output} is a folder; give a file in it, such as {output / 'replay.html'}")
-    with writing(output):
-        output.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=output.parent):
-            return output
 
 
 def _default(recordings: "Sequence[Recording]", overrides: Sequence[str]) -> Path:
