@@ -19,6 +19,7 @@ METRICS = (
     "min_obstacle_distance_m", "min_spacing_m", "centre_error_m", "task_time_s", "effort",
 )  # fmt: skip
 """Metrics of an episode that are kept; docs/benchmark.md defines them."""
+DIGITS = ".6g"
 
 
 class Plan(NamedTuple):
@@ -94,7 +95,7 @@ def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> P
     rows = [row for cell in planned for row in _rows(suite, *cell)]
     with replacing(path) as partial:
         frame = import_pandas("uuv-marl robustness").DataFrame.from_records(rows)
-        frame.to_csv(partial, index=False, float_format="%.6g")
+        frame.to_csv(partial, index=False, float_format=f"%{DIGITS}")
     return path
 
 
