@@ -37,12 +37,12 @@ def from_function(function: RewardFunction, swarm: Swarm, running: Bool) -> Step
     total = np.zeros(shape)
 
     def fill(_begin: int, _end: int) -> None:
-        total[:] = checked(function(swarm), swarm, running, "the reward function's array")
+        total[:] = valid_values(function(swarm), swarm, running, "the reward function's array")
 
     return StepReward(total, np.zeros((0, *shape)), fill)
 
 
-def checked(values: Any, swarm: Swarm, running: Bool, what: str) -> Float64:
+def valid_values(values: Any, swarm: Swarm, running: Bool, what: str) -> Float64:
     """The values, zero for vehicles that did not act in the step, shape (world, vehicle)."""
     values, acted = np.asarray(values, np.float64), running[:, None] & (swarm.state.alive | swarm.facts.lost)
     if values.shape != acted.shape:

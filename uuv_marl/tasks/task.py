@@ -21,7 +21,7 @@ from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import allocate
 from uuv_marl.tasks.measures import MEASURED
-from uuv_marl.tasks.reward import StepReward, Terms, checked
+from uuv_marl.tasks.reward import StepReward, Terms, valid_values
 from uuv_marl.types import Bool, Float64, Int64
 
 
@@ -162,7 +162,7 @@ class Task(ABC):
                     "declare terms in rewards"
                 )
             for k, name in enumerate(names):
-                terms[k] = checked(given[name], self.swarm, running, f"term {name!r} of {owner}")
+                terms[k] = valid_values(given[name], self.swarm, running, f"term {name!r} of {owner}")
             total[:] = terms.sum(axis=0)
 
         return StepReward(total, terms, fill)
