@@ -34,14 +34,14 @@ def test_every_map_can_be_passed_from_each_start_with_its_clearance(kind):
         swarm.reset(seed)
         c, s = task.memory.turn[0]
         north, east = swarm.state.eta[0, :, 0], swarm.state.eta[0, :, 1]
-        starts = parts[grid.cells(c * north + s * east, c * east - s * north)]
+        starts = parts[grid.cell(c * north + s * east, c * east - s * north)]
         assert parts[goal] > 0
         assert kind == made.kind
         assert (starts > 0).all()
         assert swarm.facts.clearance.min() >= numbers.start_clear_m
         assert len(made.discs) < swarm.world_map.obstacles.shape[1]
-        assert (task.path_lengths() >= swarm.facts.away).all()
-        assert (task.path_lengths() < 3.0 * swarm.facts.away).all()
+        assert (task.path_length_m() >= swarm.facts.away).all()
+        assert (task.path_length_m() < 3.0 * swarm.facts.away).all()
 
 
 def test_free_cells_and_ways_are_those_of_brute_force():

@@ -40,7 +40,7 @@ def test_what_the_channel_tells_is_true(decisions):
     swarm, policy = piloted("oracle", told(), worlds=8, seed=FIRST)
     percept = fly(swarm, policy, decisions)
     task, state, hull = swarm.task, swarm.state, swarm.scenario.collision.hull_radius_m
-    np.testing.assert_allclose(percept["path_length"][:, :, 0], task.path_lengths(), rtol=1e-6)
+    np.testing.assert_allclose(percept["path_length"][:, :, 0], task.path_length_m(), rtol=1e-6)
     for w in range(8):
         discs, goal = (
             swarm.world_map.obstacles[w, : swarm.world_map.num_obstacles[w]],
@@ -98,12 +98,12 @@ def test_geodesic_progress_is_what_the_way_has_shortened_by():
     knowing, dense = (BatchedEnv(plain, 4, reward) for reward in ("geodesic", "dense"))
     for env in (knowing, dense):
         env.reset(FIRST)
-    before, total = knowing.task.path_lengths(), 0.0
+    before, total = knowing.task.path_length_m(), 0.0
     for _ in range(20):
         result, usual = (env.step(np.full((4, 10, 2), 0.6)) for env in (knowing, dense))
         total += result.terms["progress"]
         for term in ("obstacle", "spacing", "effort", "collision", "stay"):
             np.testing.assert_array_equal(result.terms[term], usual.terms[term])
-    np.testing.assert_allclose(total, (before - knowing.task.path_lengths()) / plain.reward.progress_m, atol=1e-9)
+    np.testing.assert_allclose(total, (before - knowing.task.path_length_m()) / plain.reward.progress_m, atol=1e-9)
     with pytest.raises(ValueError, match="choose one of task 'follow'"):
         BatchedEnv(load_scenario("starter"), 1, "geodesic")

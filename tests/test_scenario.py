@@ -2,7 +2,6 @@
 
 import re
 from collections import UserDict, UserList
-from fractions import Fraction
 from importlib import resources
 
 import numpy as np
@@ -154,7 +153,6 @@ BAD = [
     ({"swarm.num_vehicles": np.float64(7.0)}, "swarm.num_vehicles must be a valid integer, got 7.0"),
     ({"swarm.num_vehicles": np.bool_(True)}, "swarm.num_vehicles must be a valid integer, got True"),
     ({"trajectory.speed_mps": np.complex64(1)}, "trajectory.speed_mps must be a valid number"),
-    ({"trajectory.speed_mps": Fraction(10**400)}, "trajectory.speed_mps must be a valid number"),
     ({"sonar.channels": {"compass"}}, "sonar.channels must be a list, got {'compass'}"),
     ({"sonar.channels": "compass"}, "sonar.channels must be a list, got 'compass'"),
     ({"sonar.channels": b"compass"}, "sonar.channels must be a list"),
@@ -180,7 +178,7 @@ BAD_SEA = [
     ({"faults": [MEMBER | {"duration_s": 5.0}]}, "faults.duration_s is of no use to kind member, got 5.*leave it out"),
     ({"faults": [MEMBER | {"array": "bow"}]}, "faults.array must be given for kind array and for no other kind"),
     ({"faults": [ARRAY | {"array": "stern"}]}, "faults.0.array must be one of bow, port, starboard, got 'stern'"),
-    ({"faults": [MEMBER | {"share": 1.0}]}, "faults and .* may lose 54 of 54 vehicles; .*must remain: lower"),
+    ({"faults": [MEMBER | {"share": 1.0}]}, "and faults .* may lose 54 of 54 vehicles; .*must remain: shorten"),
     ({"faults": [MEMBER] * 65}, "faults must have at most 64 entries"),
     ({"faults.0.share": 0.2}, "faults.0.share is unknown: .* the list is empty: give it as a whole"),
 ]
@@ -386,7 +384,6 @@ def test_a_vehicle_of_one_s_own_takes_nothing_from_the_paper_s(tmp_path):
         ("collision.ends_vehicle", True, np.array(True)),
         ("losses.times_s", [1.0, 2.5], np.array([1.0, 2.5], np.float32)),
         ("trajectory.speed_mps", 3.5, np.float32(3.5)),
-        ("trajectory.speed_mps", 3.5, Fraction(7, 2)),
         ("obstacles", [{"centre_m": [1.0, 2.0], "radius_m": 3.0}],
          UserList([UserDict(centre_m=np.array([1.0, 2.0]), radius_m=np.float64(3.0))])),
     ],

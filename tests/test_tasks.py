@@ -70,10 +70,7 @@ def test_a_goal_at_rest_is_at_rest_where_others_pass_by():
 
 
 class Survive(Task):
-    """The scenario's own start; every vehicle is at its goal, and only the time limit ends an episode."""
-
-    def draw(self, world, rng):
-        return super().draw(world, rng)
+    """Every vehicle is at its goal, and only the time limit ends an episode."""
 
     def at_goal(self):
         return np.ones_like(self.swarm.state.alive)
@@ -190,7 +187,7 @@ NEAR = PerceptField("near", (1,), FLAG, "1 within 10 m")
 
 
 @pytest.mark.parametrize(("base", "own", "message"), [
-    (Task, {}, "must define at_goal, done, draw, reward; see uuv_marl.tasks.task.RequiredMethods"),
+    (Task, {}, "must define at_goal, done, reward; see uuv_marl.tasks.Task"),
     (Survive, {"columns": {"collisions": "", "mine_m": ""}}, "can't have collisions in columns: the name is taken"),
     (Survive, {"columns": {"constraint_share_all": ""}}, "can't have constraint_share_all in columns"),
     (Survive, {"observed": (NEAR._replace(name="detected"),)}, "can't have detected in observed or channels"),
@@ -230,7 +227,7 @@ def test_a_reward_that_a_task_does_not_know_or_does_not_give_is_refused():
         uuv_marl.parallel_env("starter", task="reach", reward="sparse")
     env = uuv_marl.parallel_env("starter", task=f"{__name__}:Broken")
     env.reset(seed=0)
-    with pytest.raises(RewardError, match="reward of Broken must give the terms one, got two"):
+    with pytest.raises(RewardError, match="reward of Broken must give a dictionary of the terms one, got two"):
         env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
 
 

@@ -345,8 +345,6 @@ from uuv_marl.tasks import Task
 from uuv_marl.tasks.reach import Reach
 class Mine(Task):
     rewards = {"dense": {"still": "-0.5 m/s for each decision", "collision": "-60 for each"}}
-    def draw(self, world, rng):
-        return super().draw(world, rng)
     def at_goal(self):
         return self.swarm.state.alive
     def done(self):

@@ -62,7 +62,7 @@ def test_the_gap_is_the_only_way_and_as_wide_as_its_numbers(tier):
         shut = np.concatenate([discs, [[0.0, at, 0.5 * gap]]])
         for map_, open_ in ((discs, True), (shut, False)):
             parts, _ = label(free_cells(map_, grid, hull))
-            here, there = (parts[grid.cells(each[:, 0], each[:, 1])] for each in (place, goal))
+            here, there = (parts[grid.cell(each[:, 0], each[:, 1])] for each in (place, goal))
             assert (here > 0).all()
             assert (here == there).all() == open_
             assert parts[0, 0] != here[0]  # the banks keep them in

@@ -155,7 +155,7 @@ HEAVY = "\n[variants.heavy.vehicle]\n"
     ("before", "after", "name", "message"),
     [
         (r"\Z", f"{HEAVY}m_kg = 25.0", "+havy", "has no variant 'havy'; it has heavy"),
-        (r"\Z", "\n[variants.heavy]\nm_kg = 25.0", "+heavy", "must hold tables, such as [variants.heavy.vehicle]"),
+        (r"\Z", "\n[variants.heavy]\nm_kg = 25.0", "+heavy", "holds 'm_kg'; it may hold vehicle and actuators only"),
         (r"\Z", f"{HEAVY}mass = 25.0", "+heavy", "vehicle.mass is unknown"),
         ("^m_kg = .*", "", "", "lacks vehicle.m_kg; add this number to the file"),
         ("^lever_arm_m = .*", "", "", "lacks actuators.lever_arm_m"),

@@ -12,7 +12,7 @@
 #
 # A task is a class whose methods give the start of an episode, the vehicles at their goal, the end of the episode, and
 # the reward. `self.swarm` is the simulation: `state` holds positions and velocities, `facts` distances and collisions.
-# A task must define `draw`, `reward`, `at_goal` and `done`; all other methods have a default. Look at `at_goal`: it
+# A task must define `reward`, `at_goal` and `done`; all other methods have a default. Look at `at_goal`: it
 # decides which vehicles succeed.
 
 # %%

@@ -20,40 +20,42 @@ def disturbances(scenario: Scenario) -> list[str]:
 
 def vehicle_disturbances(scenario: Scenario) -> list[str]:
     """Disturbances of vehicles and sonar, without moving obstacles."""
-    parts = (_current(scenario), _latency(scenario), _noise(scenario), _rest(scenario))
-    return [phrase for part in parts for phrase, on in part.items() if on]
+    current, navigation, actuators = scenario.current, scenario.navigation, scenario.actuators
+    mismatch, sound_mps = scenario.mismatch, scenario.latency.sound_speed_mps
+    differ = max(mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust)
+    every_s, lost = scenario.modem.round_s(scenario.swarm.num_vehicles, sound_mps), scenario.modem.loss_probability
+    phrases = {
+        f"current {current.speed_mps:g} m/s": current.speed_mps > 0.0,
+        f"current varies by {current.variation_mps:g} m/s": current.variation_mps > 0.0,
+        f"eddies of {current.eddy_speed_mps:g} m/s": current.eddies > 0 and current.eddy_speed_mps > 0.0,
+        "own velocity known through the water": current.velocity == "water",
+        **_of_sonar(scenario),
+        f"messages every {every_s:.3g} s, {lost:.3g} of them lost": "modem" in scenario.sonar.channels,
+        f"position drifts by {navigation.drift_share:.3g} of the distance": navigation.drift_share > 0.0,
+        f"compass bias {navigation.compass_bias_deg:g} deg": navigation.compass_bias_deg > 0.0,
+        f"thrust lags {actuators.thrust_lag_s:g} s": actuators.thrust_lag_s > 0.0,
+        f"torque lags {actuators.yaw_lag_s:g} s": actuators.yaw_lag_s > 0.0,
+        f"yaw authority {actuators.yaw_authority:.3g}": actuators.yaw_authority < 1.0,
+        f"vehicles differ by up to {differ:.3g}": differ > 0.0,
+        **{f"{_fault_phrase(fault)} on {fault.share:.3g} of vehicles": fault.share > 0.0 for fault in scenario.faults},
+    }
+    return [phrase for phrase, on in phrases.items() if on]
 
 
 def sonar_is_ideal(scenario: Scenario) -> bool:
     """Whether sonar readings have no delay, noise or loss."""
     failing = any(fault.kind == "array" and fault.share > 0.0 for fault in scenario.faults)
-    return not failing and not any([*_latency(scenario).values(), *_noise(scenario).values()])
+    return not failing and not any(_of_sonar(scenario).values())
 
 
-def _current(scenario: Scenario) -> dict[str, bool]:
-    current = scenario.current
-    return {
-        f"current {current.speed_mps:g} m/s": current.speed_mps > 0.0,
-        f"current varies by {current.variation_mps:g} m/s": current.variation_mps > 0.0,
-        f"eddies of {current.eddy_speed_mps:g} m/s": current.eddies > 0 and current.eddy_speed_mps > 0.0,
-        "own velocity known through the water": current.velocity == "water",
-    }
-
-
-def _latency(scenario: Scenario) -> dict[str, bool]:
-    latency = scenario.latency
+def _of_sonar(scenario: Scenario) -> dict[str, bool]:
+    latency, noise = scenario.latency, scenario.noise
     compensated = ", compensated" if latency.compensated else ""
     return {
         f"sound at {latency.sound_speed_mps:g} m/s": latency.travel_time,
         f"sonar {latency.processing_s:g} s late{compensated}": latency.processing_s > 0.0,
         f"a ping every {latency.active_period_s:g} s": latency.active_period_s > 0.0,
         f"passive readings every {latency.passive_period_s:g} s": latency.passive_period_s > 0.0,
-    }
-
-
-def _noise(scenario: Scenario) -> dict[str, bool]:
-    noise = scenario.noise
-    return {
         f"bearing noise {noise.bearing_deg:g} deg": noise.bearing_deg > 0.0,
         f"range noise {noise.range_m:g} m + {noise.range_share:.3g}": noise.range_m > 0.0 or noise.range_share > 0.0,
         f"passive range factor, log-sd {noise.passive_range_log_sd:g}": noise.passive_range_log_sd > 0.0,
@@ -62,26 +64,6 @@ def _noise(scenario: Scenario) -> dict[str, bool]:
         f"passive arrays detect half at {noise.passive_r50_m:g} m": noise.passive_r50_m > 0.0,
         f"silence begins at {noise.silence_probability:.3g} of readings": noise.silence_probability > 0.0,
         f"false echoes {noise.false_echo_probability:.3g} per sub-sector": noise.false_echo_probability > 0.0,
-    }
-
-
-def _rest(scenario: Scenario) -> dict[str, bool]:
-    navigation, actuators, mismatch = scenario.navigation, scenario.actuators, scenario.mismatch
-    shares = (mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust)
-    broken = {
-        f"{_fault_phrase(fault)} on {fault.share:.3g} of vehicles": fault.share > 0.0 for fault in scenario.faults
-    }
-    every_s = scenario.modem.round_s(scenario.swarm.num_vehicles, scenario.latency.sound_speed_mps)
-    lost = scenario.modem.loss_probability
-    return {
-        f"messages every {every_s:.3g} s, {lost:.3g} of them lost": "modem" in scenario.sonar.channels,
-        f"position drifts by {navigation.drift_share:.3g} of the distance": navigation.drift_share > 0.0,
-        f"compass bias {navigation.compass_bias_deg:g} deg": navigation.compass_bias_deg > 0.0,
-        f"thrust lags {actuators.thrust_lag_s:g} s": actuators.thrust_lag_s > 0.0,
-        f"torque lags {actuators.yaw_lag_s:g} s": actuators.yaw_lag_s > 0.0,
-        f"yaw authority {actuators.yaw_authority:.3g}": actuators.yaw_authority < 1.0,
-        f"vehicles differ by up to {max(shares):.3g}": max(shares) > 0.0,
-        **broken,
     }
 
 

@@ -40,16 +40,12 @@ def read_toml(path: Path) -> File:
         raise ScenarioError(f"{path} is not valid TOML: {error}") from None
 
 
-def merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    """Tables merge; everything else, lists included, is replaced."""
-    changes: dict[str, Any] = {key: replaced(below.get(key), value) for key, value in above.items()}
-    return {**below, **changes}
-
-
-def replaced(old: Any, new: Any) -> Any:
-    """The new value, merged with the old one if both are tables."""
-    both = isinstance(old, dict) and isinstance(new, dict)
-    return merged(cast(dict[str, Any], old), cast(dict[str, Any], new)) if both else cast(Any, new)
+def merged(old: Any, new: Any) -> Any:
+    """The new value; two tables are merged, everything else, lists included, is replaced."""
+    if not (isinstance(old, dict) and isinstance(new, dict)):
+        return new
+    below, above = cast(dict[str, Any], old), cast(dict[str, Any], new)
+    return {**below, **{key: merged(below.get(key), value) for key, value in above.items()}}
 
 
 def items(table: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:

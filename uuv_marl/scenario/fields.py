@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 MAX_RANGE_M = 4096.0  # largest position in a percept, so that observations are bounded
 
@@ -11,6 +11,15 @@ def within(low: float, high: float) -> Any:
     """A number's plausible range, both ends included."""
     return Field(ge=low, le=high)
 
+
+def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
+    if pair[0] > pair[1]:
+        raise ValueError(f"must be [low, high] with low <= high, got {list(pair)}")
+    return pair
+
+
+ORDERED = AfterValidator(_ordered)
+"""For a pair of numbers, the lower one first."""
 
 Signed = Annotated[float, within(-1_000_000, 1_000_000)]
 Positive = Annotated[float, within(0.001, 1_000_000)]

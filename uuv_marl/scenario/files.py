@@ -23,14 +23,8 @@ _BASE = _FOLDER / "base.toml"
 
 
 def scenario_names() -> list[str]:
-    """Names of the shipped scenarios. Raises ScenarioError if the package's data files are missing."""
-    names = sorted(path.stem for path in _FOLDER.glob("*.toml") if path != _BASE)
-    if not names:
-        raise ScenarioError(
-            f"there are no scenario files in {_FOLDER}: uuv_marl runs from a zip file, or was packed without its data; "
-            "install it unpacked, with its .toml, .json and .safetensors files"
-        )
-    return names
+    """Names of the shipped scenarios."""
+    return sorted(path.stem for path in _FOLDER.glob("*.toml") if path != _BASE)
 
 
 def load_scenario(
@@ -132,29 +126,20 @@ def _find(name: Any, beside: Path | None = None) -> Path:
     )
 
 
-def _chain(path: Path) -> list[File]:
-    """The file and all files that it extends, down to the base."""
-    chain = [read_toml(path)]
-    while not chain[-1].path.samefile(_BASE):
-        last = chain[-1]
-        name = last.data.get("extends")
-        if not isinstance(name, str | None):
-            raise ScenarioError(f"{last.path}: extends must be a scenario's name or file, got {shown(name)}")
-        parent = _BASE if name is None else _find(name, last.path.parent)
-        if any(parent.samefile(file.path) for file in chain):
-            raise ScenarioError(f"{path}: extends must not lead back to {parent}; name another scenario")
-        chain.append(read_toml(parent))
-    return chain
-
-
-def _layers(path: Path) -> Iterator[File]:
+def _layers(path: Path, above: tuple[Path, ...] = ()) -> Iterator[File]:
     """The base, the files that extend it, and the file itself; before each the vehicle that it names."""
-    for file in reversed(_chain(path)):
-        named = file.data.get("vehicle")
-        if isinstance(named, str):
-            yield vehicle_file(named, file.path.parent)
-            file.data.pop("vehicle")
-        yield file
+    file, chain = read_toml(path), (*above, path)
+    if not path.samefile(_BASE):
+        name = file.data.get("extends")
+        if not isinstance(name, str | None):
+            raise ScenarioError(f"{path}: extends must be a scenario's name or file, got {shown(name)}")
+        parent = _BASE if name is None else _find(name, path.parent)
+        if any(parent.samefile(each) for each in chain):
+            raise ScenarioError(f"{path}: extends must not lead back to {parent}; name another scenario")
+        yield from _layers(parent, chain)
+    if isinstance(file.data.get("vehicle"), str):
+        yield vehicle_file(file.data.pop("vehicle"), path.parent)
+    yield file
 
 
 def _data(scenario: Any) -> dict[str, Any]:

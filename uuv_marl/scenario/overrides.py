@@ -2,42 +2,35 @@
 
 import os
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-from decimal import Decimal
-from numbers import Integral, Real
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from pydantic import BaseModel
 
 from uuv_marl.errors import ScenarioError
-from uuv_marl.scenario.documents import replaced
+from uuv_marl.scenario.documents import merged
 from uuv_marl.scenario.messages import short, shown
 from uuv_marl.scenario.task import named_task
-
-_PLAIN: tuple[tuple[type, Callable[[Any], object]], ...] = (
-    (os.PathLike, os.fspath), (Integral, int), (Real, float), (Decimal, float),
-)  # fmt: skip
-"""Types of values and their conversions."""
 
 
 def parse_override(text: str) -> tuple[str, object]:
     """Parse ``field=value`` of the command line; the value in TOML, a bare word taken as text."""
-    field, equals, value = text.partition("=")
-    if not equals or not field.strip() or "\n" in text.strip():
+    field, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not field or "\n" in text.strip():
         raise ScenarioError(
             f"--set must look like field=value, on one line, got {shown(text)}; for instance swarm.num_vehicles=20"
         )
     try:
-        return field.strip(), tomllib.loads(f"value = {value}")["value"]
+        return field, tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
-        if value.strip().startswith(("[", "{")):
+        if value.startswith(("[", "{")):
             raise ScenarioError(
-                f"--set {shown(field.strip())} must be a list or table, got {shown(value.strip())}; texts in it "
-                'need quotes: \'task.kinds=["pocket", "bar"]\''
+                f"--set {shown(field)} must be a list or table, got {shown(value)}; texts in it need quotes: "
+                '\'task.kinds=["pocket", "bar"]\''
             ) from None
-        return field.strip(), value.strip()
+        return field, value
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"--set {shown(field.strip())} can't be read: {error}; give a plain value") from None
+        raise ScenarioError(f"--set {shown(field)} can't be read: {error}; give a plain value") from None
 
 
 def assign(data: dict[str, Any], field: str, value: Any) -> None:
@@ -47,21 +40,25 @@ def assign(data: dict[str, Any], field: str, value: Any) -> None:
 
     Raises ScenarioError if a key is not in a table or an entry does not exist.
     """
-    *path, last = field.split(".")
-    if path[:1] == ["task"]:
+    if field.startswith("task."):
         data["task"] = named_task(data.get("task", {}))
-    place: Any = data
-    for part in path:
-        place = _step(place, part, field)
+    _assigned(data, field.split("."), value, field)
+
+
+def _assigned(place: Any, path: Sequence[str], value: Any, field: str) -> Any:
+    """What a place in a document holds once the value is set, which changes tables and lists on its path."""
+    if not path:
+        return merged(place, value)
     if isinstance(place, list):
         entries = cast(list[Any], place)
-        k = _index(entries, last, field)
-        entries[k] = replaced(entries[k], value)
+        k = _index(entries, path[0], field)
+        entries[k] = _assigned(entries[k], path[1:], value, field)
     elif isinstance(place, dict):
         table = cast(dict[str, Any], place)
-        table[last] = replaced(table.get(last), value)
+        table[path[0]] = _assigned(table.get(path[0], {}), path[1:], value, field)
     else:
-        raise ScenarioError(f"{short(field)} is unknown: {short('.'.join(path))} is a value, not a table")
+        raise ScenarioError(f"{short(field)} is unknown: {shown(path[0])} follows a value, not a table")
+    return cast(Any, place)
 
 
 def leaves(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -84,7 +81,7 @@ def override_of(overrides: Mapping[str, object], field: str) -> object | None:
 def plain(value: object) -> Any:
     """A value as plain TOML data, from types of NumPy, torch and OmegaConf too.
 
-    Numbers, sequences and mappings are recognized by their protocols; other values stay as they are.
+    Sequences and mappings are recognized by their protocols; other values stay as they are.
     """
     if callable(tolist := getattr(value, "tolist", None)):  # numbers and arrays of NumPy and torch
         value = tolist()
@@ -96,20 +93,7 @@ def plain(value: object) -> Any:
         return {key: plain(entry) for key, entry in cast(Mapping[Any, object], value).items()}
     if isinstance(value, Sequence):
         return [plain(entry) for entry in cast(Sequence[object], value)]
-    to = next((to for kind, to in _PLAIN if isinstance(value, kind)), None)
-    try:
-        return value if to is None else to(value)
-    except (OverflowError, ValueError):  # a fraction beyond all floats, a signalling NaN
-        return value
-
-
-def _step(place: Any, part: str, field: str) -> Any:
-    if isinstance(place, list):
-        entries = cast(list[Any], place)
-        return entries[_index(entries, part, field)]
-    if not isinstance(place, dict):
-        raise ScenarioError(f"{short(field)} is unknown: {shown(part)} follows a value, not a table")
-    return cast(dict[str, Any], place).setdefault(part, {})
+    return os.fspath(cast("os.PathLike[str]", value)) if isinstance(value, os.PathLike) else value
 
 
 def _index(entries: Sequence[Any], part: str, field: str) -> int:

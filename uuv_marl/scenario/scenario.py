@@ -179,13 +179,12 @@ def _check_traffic(scenario: Scenario) -> None:
 
 def _check_losses(scenario: Scenario) -> None:
     """At least one vehicle remains."""
-    losses, n = len(scenario.losses.times_s), scenario.swarm.num_vehicles
+    n = scenario.swarm.num_vehicles
     members = sum(math.ceil(fault.share * n - 1e-9) for fault in scenario.faults if fault.kind == "member")
-    if losses + members >= n:
+    if (lost := len(scenario.losses.times_s) + members) >= n:
         raise ValueError(
-            f"{'faults and ' if members else ''}losses.times_s may lose {min(losses + members, n)} of {n} "
-            f"vehicles; at least one must remain: {'lower a share, ' if members else ''}shorten it or raise "
-            "swarm.num_vehicles"
+            f"losses.times_s and faults of kind member may lose {min(lost, n)} of {n} vehicles; at least one must "
+            "remain: shorten losses.times_s, lower a fault's share or raise swarm.num_vehicles"
         )
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field
 
-from uuv_marl.scenario.fields import Clock, NonNegative, Positive, Radius, Section, Signed, Speed, within
+from uuv_marl.scenario.fields import ORDERED, Clock, NonNegative, Positive, Radius, Section, Signed, Speed, within
 from uuv_marl.types import Float64
 
 NOMINAL_VEHICLES = 54  # the paper's swarm; areas grow with sqrt(n / 54) above it, which keeps the density
@@ -110,26 +110,20 @@ class Obstacle(Section):
 class RandomField(Section):
     """Distribution of trajectories and obstacles, sampled once per episode."""
 
-    legs: tuple[Legs, Legs]
+    legs: Annotated[tuple[Legs, Legs], ORDERED]
     """Fewest and most legs."""
-    leg_length_m: tuple[Positive, Positive]
+    leg_length_m: Annotated[tuple[Positive, Positive], ORDERED]
     """Shortest and longest leg."""
     turn_max_deg: Annotated[float, within(0, 150)]
     """Sharpest turn between legs."""
-    obstacles: tuple[Discs, Discs]
+    obstacles: Annotated[tuple[Discs, Discs], ORDERED]
     """Fewest and most obstacles; a field too small for them has fewer."""
-    radius_m: tuple[Radius, Radius]
+    radius_m: Annotated[tuple[Radius, Radius], ORDERED]
     """Smallest and largest radius."""
     offset_max_m: NonNegative
     """Largest distance of an obstacle's centre from the trajectory."""
     end_clear_m: Positive
     """Radius kept free around the end, for up to 54 vehicles."""
-
-    def _check(self) -> None:
-        for name in ("legs", "leg_length_m", "obstacles", "radius_m"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise ValueError(f"random_field.{name} must be [low, high] with low <= high, got [{low}, {high}]")
 
 
 class Timing(Section):

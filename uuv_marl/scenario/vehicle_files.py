@@ -7,19 +7,19 @@ from uuv_marl.errors import ScenarioError, hint
 from uuv_marl.paths import user_path
 from uuv_marl.scenario.documents import File, merged, read_toml
 from uuv_marl.scenario.hardware import Actuators, Vehicle
-from uuv_marl.scenario.messages import short, shown
+from uuv_marl.scenario.messages import shown
 
 VEHICLES = Path(__file__).resolve().parent / "vehicles"
-_FIELDS_BY_SECTION = {
-    "vehicle": set(Vehicle.model_fields),
-    "actuators": {"max_force_n", "max_torque_nm", "lever_arm_m"},
-}
 _OPTIONAL: dict[str, dict[str, Any]] = {
     section: {name: field.default for name, field in model.model_fields.items() if not field.is_required()}
     for section, model in (("vehicle", Vehicle), ("actuators", Actuators))
 }
 _OPTIONAL["actuators"] |= {"thrust_lag_s": 0.0, "yaw_lag_s": 0.0}
 """Defaults of the fields that a vehicle's file may omit, independent of the previous vehicle."""
+_NEEDED = {
+    "vehicle": Vehicle.model_fields.keys() - _OPTIONAL["vehicle"].keys(),
+    "actuators": {"max_force_n", "max_torque_nm", "lever_arm_m"},
+}
 
 
 def vehicle_names() -> list[str]:
@@ -49,20 +49,22 @@ def vehicle_file(name: str, beside: Path | None = None) -> File:
     """A vehicle's file, which must be complete, so that numbers of two vehicles are never mixed."""
     plain, chosen = _without_variants(name)
     file = read_toml(_find_vehicle(plain, beside))
-    for section, fields in _FIELDS_BY_SECTION.items():
-        table = file.data.get(section)
-        needed = fields - _OPTIONAL[section].keys()
-        missing = sorted(needed - set(cast(dict[str, Any], table) if isinstance(table, dict) else ()))
+    for section, needed in _NEEDED.items():
+        missing = sorted(needed - _table(file.data.get(section)).keys())
         if missing:
             raise ScenarioError(f"vehicle {file.path} lacks {section}.{missing[0]}; add this number to the file")
-    other = next((key for key in file.data if key not in {*_FIELDS_BY_SECTION, "variants"}), None)
-    if other is not None:
-        raise ScenarioError(
-            f"vehicle {file.path} holds {shown(other)}; it may hold vehicle and actuators only, and variants of them"
-        )
-    data = {section: {**_OPTIONAL[section], **file.data[section]} for section in _FIELDS_BY_SECTION}
+    data = {key: merged(_OPTIONAL.get(key), value) for key, value in file.data.items()}
+    variants = _table(data.pop("variants", {}))
     for variant in chosen:
-        data = merged(data, _variant(file, variant))
+        if not isinstance(variants.get(variant), dict):
+            raise ScenarioError(
+                f"vehicle {file.path.stem} has no variant {shown(variant)}; it has {', '.join(variants) or 'none'}"
+            )
+        data = merged(data, variants[variant])
+    if other := sorted(data.keys() - _NEEDED.keys()):
+        raise ScenarioError(
+            f"vehicle {file.path} holds {shown(other[0])}; it may hold vehicle and actuators only, and variants of them"
+        )
     if chosen:
         data["vehicle"]["name"] = "+".join([str(data["vehicle"]["name"]), *chosen])
     return file._replace(data=data, variants=chosen)
@@ -70,26 +72,12 @@ def vehicle_file(name: str, beside: Path | None = None) -> File:
 
 def optional_defaults(vehicle: object) -> dict[str, Any] | None:
     """Defaults of a complete vehicle's omitted fields; None for a table with only some numbers of a vehicle."""
-    needed = _FIELDS_BY_SECTION["vehicle"] - _OPTIONAL["vehicle"].keys()
-    whole = isinstance(vehicle, dict) and needed <= cast(dict[str, Any], vehicle).keys()
-    return dict(_OPTIONAL["vehicle"]) if whole else None
+    return dict(_OPTIONAL["vehicle"]) if _NEEDED["vehicle"] <= _table(vehicle).keys() else None
 
 
-def _variant(file: File, name: str) -> dict[str, Any]:
-    """Changes by a variant of a vehicle."""
-    every = file.data.get("variants", {})
-    variants = cast(dict[str, Any], every) if isinstance(every, dict) else {}
-    changes = variants.get(name)
-    if changes is None:
-        raise ScenarioError(
-            f"vehicle {file.path.stem} has no variant {shown(name)}; it has {', '.join(variants) or 'none'}"
-        )
-    if not isinstance(changes, dict) or not cast(dict[str, Any], changes).keys() <= _FIELDS_BY_SECTION.keys():
-        raise ScenarioError(
-            f"vehicle {file.path}: variants.{short(name)} must hold tables, such as [variants.{short(name)}.vehicle], "
-            "of vehicle and actuators only"
-        )
-    return cast(dict[str, Any], changes)
+def _table(value: object) -> dict[str, Any]:
+    """A table, empty in place of any other value."""
+    return cast(dict[str, Any], value) if isinstance(value, dict) else {}
 
 
 def _without_variants(name: str) -> tuple[str, list[str]]:

@@ -8,17 +8,18 @@ vehicles. A weakness: if one vehicle keeps the swarm from arriving, the others g
 """
 
 import math
+from collections import namedtuple
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
 from uuv_marl.errors import ScenarioError
 from uuv_marl.percept import DURATION, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
+from uuv_marl.scenario.sections import Constraints, Reward
 from uuv_marl.sim.arrays import Facts, State
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.model import rules
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.reward import StepReward, Terms
@@ -61,10 +62,6 @@ class Follow(Task):
         if cls.reward is Follow.reward and cls.rewards != Follow.rewards:
             raise ScenarioError(f"task {cls.__name__} has rewards of its own; define reward(running), which gives them")
 
-    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
-        """The scenario's own start, trajectory and obstacles."""
-        return super().draw(world, rng)
-
     def step_reward(self, running: Bool, *, keep_terms: bool = True) -> StepReward:
         """The compiled reward, filled while worlds are stepped, unless a subclass defines its own ``reward``."""
         own = type(self).reward is not Follow.reward
@@ -77,7 +74,7 @@ class Follow(Task):
         reward, limit_s = np.zeros((worlds, n)), swarm.time_limit_s
 
         def fill(begin: int, end: int) -> None:
-            _fill_some(begin, end, running, limit_s, swarm.state, swarm.facts, self._weights, terms, reward)
+            _fill(begin, end, running, limit_s, swarm.state, swarm.facts, self._weights, terms, reward)
 
         return StepReward(reward, terms, fill, concurrent=True)
 
@@ -122,35 +119,21 @@ class Follow(Task):
         return self.arrived(world)
 
 
-class RewardWeights(NamedTuple):
-    """The scenario's weights and lengths, as numbers for the compiled functions."""
+RewardWeights: Any = namedtuple(
+    "RewardWeights", [*Reward.model_fields, *Constraints.model_fields, "period_s", "settled_s"]
+)
+"""The scenario's weights and lengths, as numbers for the compiled function.
 
-    period_s: float
-    tracking: float
-    obstacle: float
-    spacing: float
-    effort: float
-    collision: float
-    arrival: float
-    progress_m: float
-    progress_far_m: float
-    s_l_m: float
-    s_o_m: float
-    s_u_m: float
-    settled_s: float
-    """The step of the arrival ends less than this after ``Facts.arrival_s``, later steps end more."""
+The step of the arrival ends less than ``settled_s`` after ``Facts.arrival_s``, later steps end more.
+"""
 
 
-def reward_weights(scenario: Scenario) -> RewardWeights:
-    """The scenario's weights and lengths."""
-    weight, limit, timing = scenario.reward, scenario.constraints, scenario.timing
-    dwell = rules(scenario).dwell_ticks
-    return RewardWeights(
-        timing.decision_period_s, weight.tracking, weight.obstacle, weight.spacing, weight.effort,
-        weight.collision, weight.arrival, weight.progress_m, weight.progress_far_m,
-        limit.s_l_m, limit.s_o_m, limit.s_u_m,
-        settled_s=(dwell + timing.control_steps_per_decision - 0.5) * timing.control_step_s,
-    )  # fmt: skip
+def reward_weights(scenario: Scenario) -> Any:
+    """The scenario's ``RewardWeights``."""
+    timing, dwell = scenario.timing, rules(scenario).dwell_ticks
+    settled_s = (dwell + timing.control_steps_per_decision - 0.5) * timing.control_step_s
+    numbers = {**dict(scenario.reward), **dict(scenario.constraints)}
+    return RewardWeights(**numbers, period_s=timing.decision_period_s, settled_s=settled_s)
 
 
 @compiled
@@ -161,48 +144,41 @@ def shortfall(share: float) -> float:
 
 @compiled
 def _fill(
-    w: int, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights, terms: Float64, reward: Float64
-) -> None:
-    """Fill the weighted ``terms`` of one world, shape (term, world or 0, vehicle), and their sum; zero before."""
-    left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
-    worst_rate = weights.tracking + weights.obstacle + weights.spacing + weights.effort
-    arrived = not math.isnan(facts.arrival_s[w, 0])
-    arrives = facts.time_s[w] - facts.arrival_s[w, 0] < weights.settled_s  # no NaN is
-    far, dense = weights.progress_far_m, terms.shape[0] > PROGRESS
-    store_terms = terms.shape[1] > 0
-    for i in range(state.alive.shape[1]):
-        alive, lost = state.alive[w, i], facts.lost[w, i]
-        if not (alive or lost):
-            continue
-        away = facts.away[w, i]
-        tracking = -weights.tracking * weights.period_s * shortfall(away / weights.s_l_m - 1.0)
-        obstacle = -weights.obstacle * weights.period_s * shortfall(1.0 - facts.clearance[w, i] / weights.s_o_m)
-        spacing = -weights.spacing * weights.period_s * shortfall(1.0 - facts.spacing[w, i] / weights.s_u_m)
-        effort = -weights.effort * weights.period_s * facts.effort[w, i]
-        collision = -weights.collision * facts.vehicle_collisions[w, i]
-        loss, arrival, progress = 0.0, 0.0, 0.0
-        if lost:
-            left = (far - min(away, far)) / weights.progress_m if dense else 0.0
-            loss = -(weights.collision + weights.arrival + worst_rate * left_s + left)
-        if alive and arrives:
-            arrival = weights.arrival
-        if dense and (arrives or not arrived):
-            left = 0.0 if arrives else min(away, far)
-            progress = (min(facts.away_before[w, i], far) - left) / weights.progress_m
-        reward[w, i] = 0.0 + tracking + obstacle + spacing + effort + collision + loss + arrival + progress
-        if store_terms:
-            for k, term in enumerate((tracking, obstacle, spacing, effort, collision, loss, arrival)):
-                terms[k, w, i] = term
-            if dense:
-                terms[PROGRESS, w, i] = progress
-
-
-@compiled
-def _fill_some(
-    begin: int, end: int, running: Bool, time_limit_s: Float64, state: State, facts: Facts, weights: RewardWeights,
+    begin: int, end: int, running: Bool, time_limit_s: Float64, state: State, facts: Facts, weights: Any,
     terms: Float64, reward: Float64,
 ) -> None:  # fmt: skip
-    """``_fill`` for those worlds of a range that are ``running``, shape (world,)."""
+    """Fill the weighted ``terms``, shape (term, world or 0, vehicle), and their sum; zero before.
+
+    Only for the worlds of a range that are ``running``, shape (world,).
+    """
+    worst_rate = weights.tracking + weights.obstacle + weights.spacing + weights.effort
+    far, dense, store_terms = weights.progress_far_m, terms.shape[0] > PROGRESS, terms.shape[1] > 0
     for w in range(begin, end):
-        if running[w]:
-            _fill(w, time_limit_s, state, facts, weights, terms, reward)
+        left_s = max(time_limit_s[w] - facts.time_s[w], 0.0)
+        arrived = not math.isnan(facts.arrival_s[w, 0])
+        arrives = facts.time_s[w] - facts.arrival_s[w, 0] < weights.settled_s  # no NaN is
+        for i in range(state.alive.shape[1] if running[w] else 0):
+            alive, lost = state.alive[w, i], facts.lost[w, i]
+            if not (alive or lost):
+                continue
+            away = facts.away[w, i]
+            tracking = -weights.tracking * weights.period_s * shortfall(away / weights.s_l_m - 1.0)
+            obstacle = -weights.obstacle * weights.period_s * shortfall(1.0 - facts.clearance[w, i] / weights.s_o_m)
+            spacing = -weights.spacing * weights.period_s * shortfall(1.0 - facts.spacing[w, i] / weights.s_u_m)
+            effort = -weights.effort * weights.period_s * facts.effort[w, i]
+            collision = -weights.collision * facts.vehicle_collisions[w, i]
+            loss, arrival, progress = 0.0, 0.0, 0.0
+            if lost:
+                left = (far - min(away, far)) / weights.progress_m if dense else 0.0
+                loss = -(weights.collision + weights.arrival + worst_rate * left_s + left)
+            if alive and arrives:
+                arrival = weights.arrival
+            if dense and (arrives or not arrived):
+                left = 0.0 if arrives else min(away, far)
+                progress = (min(facts.away_before[w, i], far) - left) / weights.progress_m
+            reward[w, i] = 0.0 + tracking + obstacle + spacing + effort + collision + loss + arrival + progress
+            if store_terms:
+                for k, term in enumerate((tracking, obstacle, spacing, effort, collision, loss, arrival)):
+                    terms[k, w, i] = term
+                if dense:
+                    terms[PROGRESS, w, i] = progress

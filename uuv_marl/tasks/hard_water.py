@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator
 
 from uuv_marl.percept import LENGTH, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario, ScenarioError
@@ -15,7 +14,7 @@ from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cells, reached
-from uuv_marl.tasks.maps.guidance import NUM_WALLS, PATH_FIELDS, write_path
+from uuv_marl.tasks.maps.guidance import PATH_FIELDS, in_axes, move_ahead, path_terms
 from uuv_marl.tasks.maps.kinds import KINDS, Bar, Forest, Gate, Harbour, Maze, Piles, Pocket
 from uuv_marl.tasks.maps.walls import Basin, MapKind, Range, banks, between, joined
 from uuv_marl.tasks.reach import Reach, ReachNumbers
@@ -38,17 +37,10 @@ _AROUND = np.indices((3, 3)).reshape(2, 9, 1) - 1
 """Rows and columns from a cell to itself and to its eight neighbours."""
 
 
-def _known(kinds: tuple[str, ...]) -> tuple[str, ...]:
-    unknown = [kind for kind in kinds if kind not in KINDS]
-    if unknown or not kinds:
-        raise ValueError(f"task.kinds must name some of {', '.join(KINDS)}, got {list(kinds)}")
-    return kinds
-
-
 class HardWaterNumbers(ReachNumbers):
     """Numbers of ``hard_water``; the scenario's file has their sources."""
 
-    kinds: Annotated[tuple[str, ...], AfterValidator(_known)]
+    kinds: tuple[str, ...]
     """Kinds of maps, equally likely."""
     length_m: Range
     """Distance from the start to the goal."""
@@ -77,6 +69,8 @@ class HardWaterNumbers(ReachNumbers):
     piles: Piles
 
     def _check(self) -> None:
+        if not self.kinds or not {*self.kinds} <= KINDS.keys():
+            raise ValueError(f"task.kinds must name some of {', '.join(KINDS)}, got {list(self.kinds)}")
         if self.length_m[0] - self.goal_clear_m < self.first_wall_m:
             raise ValueError(
                 f"task.length_m must be at least {self.first_wall_m + self.goal_clear_m:g}, task.first_wall_m and "
@@ -97,8 +91,6 @@ class Map(NamedTuple):
     """Distance from the start to the goal [m]."""
     discs: Float64
     """Walls and banks: x, y and radius [m], shape (disc, 3)."""
-    tries: int
-    """How many were sampled until this one was accepted."""
 
 
 class HardWaterMemory(NamedTuple):
@@ -157,11 +149,12 @@ class HardWater(Reach):
         discs[:, :2] = rotated(sampled.discs[:, :2], c, s)
         eta, nu = start_state(scenario, goal, rng)
         free = free_cells(sampled.discs, self._grid, scenario.collision.hull_radius_m)
-        memory.path_length[world] = np.minimum(distances(free, *self._grid.cell(sampled.length, 0.0)), FAR_M)
+        goal_cell = self._grid.cell(sampled.length, 0.0)
+        memory.path_length[world] = np.minimum(distances(free, *goal_cell), FAR_M)
         if memory.path_cost.size:
             dear = np.sum([~free_cells(sampled.discs, self._grid, near) for near in _DEAR_M], axis=0)
             price = 1.0 + _DEAR * dear + _NARROW * ~free_cells(sampled.discs, self._grid, self.numbers.clearance_m)
-            memory.path_cost[world] = distances(free, *self._grid.cell(sampled.length, 0.0), price)
+            memory.path_cost[world] = distances(free, *goal_cell, price)
         memory.kind[world] = list(KINDS).index(sampled.kind)
         n = len(eta)
         path_lengths = self._path_lengths(np.full(n, world), eta[:, :2], goal[1])
@@ -178,15 +171,15 @@ class HardWater(Reach):
             ScenarioError: none of a thousand maps has one.
         """
         numbers = self.numbers
-        for tries in range(1, MOST_TRIES + 1):
+        for _ in range(MOST_TRIES):
             kind = numbers.kinds[int(rng.integers(len(numbers.kinds)))]
             length, half = between(rng, numbers.length_m), between(rng, numbers.half_width_m)
             water = Basin(length, half, numbers.first_wall_m, length - numbers.goal_clear_m)
             own: MapKind = getattr(numbers, kind)
             walls = own.walls(rng, water)
             shore = banks(length, half, numbers.behind_m, numbers.beyond_m, numbers.bank_radius_m)
-            sampled = Map(kind, length, joined(walls, shore), tries)
-            if len(sampled.discs) <= MOST_DISCS and self._passable(sampled, walls, own.blocks()):
+            sampled = Map(kind, length, joined(walls, shore))
+            if len(sampled.discs) <= MOST_DISCS and self._passable(sampled, walls, own.blocks):
                 return sampled
         raise ScenarioError(
             f"task {self.swarm.scenario.task.name!r} sampled {MOST_TRIES} maps of {', '.join(numbers.kinds)}, none of "
@@ -211,35 +204,34 @@ class HardWater(Reach):
 
         ``world`` is the world of each place, shape (place,).
         """
-        (c, s), (north, east) = self.memory.turn[world].T, place.T
-        x, y = c * north + s * east, c * east - s * north
-        row, column = self._grid.cells(x, y)
-        r = np.minimum(np.maximum(row + _AROUND[0], 0), self._grid.rows - 1)
-        k = np.minimum(np.maximum(column + _AROUND[1], 0), self._grid.columns - 1)
+        x, y = in_axes(place, self.memory.turn[world]).T
+        row, column = self._grid.cell(x, y)
+        r = np.clip(row + _AROUND[0], 0, self._grid.rows - 1)
+        k = np.clip(column + _AROUND[1], 0, self._grid.columns - 1)
         off = np.hypot(x - (self._grid.x + r * CELL_M), y - (self._grid.y + k * CELL_M))
         best = np.minimum((self.memory.path_length[world, r, k] + off).min(axis=0), FAR_M)
         return np.maximum(best, np.hypot(*(place - goal).T))
 
-    def path_lengths(self, which: Bool | None = None) -> Float64:
-        """Length of the shortest collision-free path of vehicles to their goals [m].
+    def _lengths_of(self, chosen: Bool) -> Float64:
+        """Length of the paths of chosen vehicles (world, vehicle) to their goals [m], shape (vehicle,)."""
+        world, goals = np.nonzero(chosen)[0], self.swarm.world_map.waypoints[:, 0, 1]
+        return self._path_lengths(world, self.swarm.state.eta[chosen][:, :2], goals[world])
 
-        With ``which``, shape (world, vehicle), only of these vehicles, shape (vehicle,); else shape (world, vehicle).
-        """
-        eta, goals = self.swarm.state.eta, self.swarm.world_map.waypoints[:, 0, 1]
-        chosen = np.ones(eta.shape[:2], np.bool_) if which is None else which
-        world = np.nonzero(chosen)[0]
-        lengths = self._path_lengths(world, eta[chosen][:, :2], goals[world])
-        return lengths.reshape(eta.shape[:2]) if which is None else lengths
+    def path_length_m(self) -> Float64:
+        """Length of the shortest collision-free path of each vehicle to its goal [m], shape (world, vehicle)."""
+        everyone = np.ones_like(self.swarm.state.alive)
+        return self._lengths_of(everyone).reshape(everyone.shape)
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The fields of the channel ``path``."""
-        swarm, memory = self.swarm, self.memory
-        if not memory.path_cost.size:
+        grid, path_cost, turn = self._grid, self.memory.path_cost, self.memory.turn[:, None]
+        if not path_cost.size:
             return {}
-        shape = swarm.state.alive.shape
-        path, walls = np.zeros((*shape, 2)), np.zeros((*shape, NUM_WALLS, 2))
-        write_path(swarm.state, swarm.world_map, swarm.heading, memory.turn, memory.path_cost, self._grid, path, walls)
-        return {"path": path, "path_length": self.path_lengths()[:, :, None], "path_walls": walls}
+        place = in_axes(self.swarm.state.eta[:, :, :2], turn)
+        row, column = grid.cell(place[:, :, 0], place[:, :, 1])
+        move_ahead(path_cost, row, column)
+        ahead = np.stack([grid.x + row * CELL_M, grid.y + column * CELL_M], axis=2) - place
+        return path_terms(self.swarm, in_axes(ahead, turn * [1.0, -1.0]), self.path_length_m())
 
     @classmethod
     def state_fields(cls, scenario: Scenario) -> FieldTable:
@@ -251,26 +243,22 @@ class HardWater(Reach):
 
     def state(self) -> Terms:
         """The values of ``state_fields``."""
-        return {**super().state(), "path_length": self.path_lengths()}
+        return {**super().state(), "path_length": self.path_length_m()}
 
     def move(self, running: Bool) -> None:  # noqa: ARG002
         """Note the lengths of paths, from which the reward ``geodesic`` takes progress."""
         if self.reward_name == "geodesic":
-            self._remaining_before_m = self.path_lengths()
-
-    def path_length_m(self) -> Float64:
-        """Length of the collision-free path [m], shape (world, vehicle)."""
-        return self.path_lengths()
+            self._remaining_before_m = self.path_length_m()
 
     def remaining_m(self) -> tuple[Float64, Float64]:
         """With the reward ``geodesic`` the path's length, else the distance."""
         geodesic = self.reward_name == "geodesic"
-        return (self.path_lengths(), self._remaining_before_m) if geodesic else super().remaining_m()
+        return (self.path_length_m(), self._remaining_before_m) if geodesic else super().remaining_m()
 
     def at_goal(self) -> Bool:
         """Vehicles within ``near_m`` of the goal, along the collision-free path."""
         near = self.swarm.facts.away <= self.numbers.near_m
-        near[near] = self.path_lengths(near) <= self.numbers.near_m
+        near[near] = self._lengths_of(near) <= self.numbers.near_m
         return near
 
     def metrics(self, world: int) -> dict[str, float | None]:

@@ -1,6 +1,6 @@
 """``StepReward``: the reward of a step, from compiled code, from a task's named terms or from a user's function."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,43 +31,18 @@ class StepReward(NamedTuple):
     """Whether ``fill`` may run for some worlds while others are still being stepped; if not, it fills all at once."""
 
 
-def from_terms(owner: str, names: Sequence[str], give: Callable[[], Terms], swarm: Swarm, running: Bool) -> StepReward:
-    """The reward of ``running`` worlds, shape (world,), from weighted terms by name, shape (world, vehicle) each.
-
-    ``give`` returns the terms after the step; ``fill`` raises RewardError unless they are those that the class
-    ``owner`` declares, finite and of this shape.
-    """
-    shape = (swarm.num_worlds, swarm.num_vehicles)
-    total, terms = np.zeros(shape), np.zeros((len(names), *shape))
-
-    def fill(_begin: int, _end: int) -> None:
-        given = give()
-        if not isinstance(given, Mapping):
-            raise RewardError(f"reward of {owner} must return a dictionary of its terms, got {type(given).__name__}")
-        if {*given} != {*names}:
-            raise RewardError(
-                f"reward of {owner} must give the terms {', '.join(names) or 'none'}, got {', '.join(given)}; "
-                "declare terms in rewards"
-            )
-        for k, name in enumerate(names):
-            terms[k] = _checked(given[name], swarm, running, f"term {name!r} of {owner}")
-        total[:] = terms.sum(axis=0)
-
-    return StepReward(total, terms, fill)
-
-
 def from_function(function: RewardFunction, swarm: Swarm, running: Bool) -> StepReward:
     """The reward of a user's function, without terms; for ``running`` worlds, shape (world,)."""
     shape = (swarm.num_worlds, swarm.num_vehicles)
     total = np.zeros(shape)
 
     def fill(_begin: int, _end: int) -> None:
-        total[:] = _checked(function(swarm), swarm, running, "the reward function's array")
+        total[:] = valid_values(function(swarm), swarm, running, "the reward function's array")
 
     return StepReward(total, np.zeros((0, *shape)), fill)
 
 
-def _checked(values: Any, swarm: Swarm, running: Bool, what: str) -> Float64:
+def valid_values(values: Any, swarm: Swarm, running: Bool, what: str) -> Float64:
     """The values, zero for vehicles that did not act in the step, shape (world, vehicle)."""
     values, acted = np.asarray(values, np.float64), running[:, None] & (swarm.state.alive | swarm.facts.lost)
     if values.shape != acted.shape:

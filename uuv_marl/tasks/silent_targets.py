@@ -18,7 +18,7 @@ from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.tasks.maps.guidance import NUM_WALLS, PATH_FIELDS, write_walls
+from uuv_marl.tasks.maps.guidance import PATH_FIELDS, path_terms
 from uuv_marl.tasks.maps.walls import Range, Span, between
 from uuv_marl.tasks.reach import Reach
 from uuv_marl.tasks.reward import Terms
@@ -207,10 +207,6 @@ class SilentTargets(Reach):
         x, y = np.moveaxis(targets[:, None, :, :2] - state.eta[:, :, None, :2], -1, 0)
         return np.where(state.alive[:, :, None], np.sqrt(x * x + y * y), math.inf)
 
-    def held(self) -> Bool:
-        """Targets that are held, shape (world, target)."""
-        return self.away().min(axis=1) <= self.numbers.held_m
-
     def _remaining_m(self) -> Float64:
         """Distance to the nearest target that no vehicle nearer to it holds [m], 0 where there is none."""
         away, nearest = self._nearest()
@@ -229,7 +225,7 @@ class SilentTargets(Reach):
     def update(self, running: Bool) -> None:
         """Note which targets are held, and the distances to the others."""
         super().update(running)
-        memory, time_s, held = self.memory, self.swarm.facts.time_s, self.held()
+        memory, time_s, held = self.memory, self.swarm.facts.time_s, self._nearest()[1][:, 0] <= self.numbers.held_m
         late = running & (time_s > 0.5 * self.swarm.time_limit_s)
         memory.held[late] += held[late]
         memory.judged[late] += 1.0
@@ -247,18 +243,12 @@ class SilentTargets(Reach):
         if "path" not in swarm.scenario.sonar.channels:
             return fields
         world_map, away = swarm.world_map, self.away()
-        path, walls = np.zeros((*away.shape[:2], 2)), np.zeros((*away.shape[:2], NUM_WALLS, 2))
+        path = np.zeros((*away.shape[:2], 2))
         soon = world_map.obstacles[:, :, :2] + LEAD_S * world_map.obstacle_velocity
         for w in range(len(away)):
             vehicle, target = linear_sum_assignment(np.minimum(away[w], 1e9))
             path[w, vehicle] = soon[w, target] - swarm.state.eta[w, vehicle, :2]
-        (x, y), (c, s) = np.moveaxis(path, -1, 0), np.moveaxis(swarm.heading, -1, 0)
-        write_walls(swarm.state, world_map, swarm.heading, walls)
-        return fields | {
-            "path": np.stack([c * x + s * y, c * y - s * x], axis=-1),
-            "path_length": np.sqrt(x * x + y * y)[:, :, None],
-            "path_walls": walls,
-        }
+        return {**fields, **path_terms(swarm, path, np.sqrt((path * path).sum(axis=2)))}
 
     @classmethod
     def state_fields(cls, scenario: Scenario) -> FieldTable:

@@ -1,4 +1,4 @@
-"""``Task``: what a swarm is to do. First the four methods that a task must define, then what it may declare and define.
+"""``Task``: what a swarm is to do.
 
 All methods take and give arrays over worlds and vehicles. Those with ``running`` get the worlds that are stepped, shape
 (world,); their results for other worlds are not used. Those with ``world`` concern one world, by its index.
@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.errors import ScenarioError
+from uuv_marl.errors import RewardError, ScenarioError
 from uuv_marl.percept import CHANNELS, FLAG, FieldTable, PerceptField, percept_table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Section
@@ -21,38 +21,12 @@ from uuv_marl.sim.field import longest_duration
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import allocate
 from uuv_marl.tasks.measures import MEASURED
-from uuv_marl.tasks.reward import StepReward, Terms, from_terms
+from uuv_marl.tasks.reward import StepReward, Terms, valid_values
 from uuv_marl.types import Bool, Float64, Int64
 
 
-class RequiredMethods(ABC):
-    """What every task defines."""
-
-    swarm: Swarm
-
-    @abstractmethod
-    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:
-        """What a world starts from, drawn from its own generator; ``memory`` is cleared. VMAS: ``reset_world_at``.
-
-        ``super().draw(world, rng)`` gives what the scenario itself says.
-        """
-        return default_setup(self.swarm.scenario, rng)
-
-    @abstractmethod
-    def reward(self, running: Bool) -> Terms:
-        """The weighted ``terms`` of the latest step by name, shape (world, vehicle) each. VMAS: ``reward``."""
-
-    @abstractmethod
-    def at_goal(self) -> Bool:
-        """Vehicles that are where they should be now, shape (world, vehicle)."""
-
-    @abstractmethod
-    def done(self) -> Bool:
-        """Worlds whose episode ends before the time limit, shape (world,). VMAS: ``done``."""
-
-
-class Task(RequiredMethods):
-    """The base of every task, with a default for everything beyond ``RequiredMethods``.
+class Task(ABC):
+    """The base of every task, with a default for everything but ``reward``, ``at_goal`` and ``done``.
 
     Args:
         swarm: of any number of worlds, before its first reset.
@@ -106,6 +80,25 @@ class Task(RequiredMethods):
         """Lengths of axes: ``group``, ``point`` (corners), ``obstacle`` where unusual, and those of ``Memory``."""
         return {}
 
+    @abstractmethod
+    def reward(self, running: Bool) -> Terms:
+        """The weighted ``terms`` of the latest step by name, shape (world, vehicle) each. VMAS: ``reward``."""
+
+    @abstractmethod
+    def at_goal(self) -> Bool:
+        """Vehicles that are where they should be now, shape (world, vehicle)."""
+
+    @abstractmethod
+    def done(self) -> Bool:
+        """Worlds whose episode ends before the time limit, shape (world,). VMAS: ``done``."""
+
+    def draw(self, world: int, rng: np.random.Generator) -> EpisodeSetup:  # noqa: ARG002
+        """What a world starts from, drawn from its own generator: by default what the scenario itself says.
+
+        ``memory`` is cleared before. VMAS: ``reset_world_at``.
+        """
+        return default_setup(self.swarm.scenario, rng)
+
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
         """The largest ``duration_s`` that ``draw`` gives [s]."""
@@ -151,11 +144,28 @@ class Task(RequiredMethods):
     def step_reward(self, running: Bool, *, keep_terms: bool = True) -> StepReward:  # noqa: ARG002
         """The reward of the coming step from ``reward``; a task with compiled code for it overrides this.
 
+        Its ``fill`` raises RewardError unless ``reward`` gives the declared terms, finite and of the right shape.
+
         Args:
             running: worlds that are stepped, shape (world,).
             keep_terms: whether the terms are needed beside their sum.
         """
-        return from_terms(type(self).__name__, [*self.terms], lambda: self.reward(running), self.swarm, running)
+        owner, names, shape = type(self).__name__, [*self.terms], self.swarm.state.alive.shape
+        total, terms = np.zeros(shape), np.zeros((len(names), *shape))
+
+        def fill(_begin: int, _end: int) -> None:
+            given: Any = self.reward(running)
+            if not isinstance(given, Mapping) or {*given} != {*names}:
+                got = ", ".join(given) if isinstance(given, Mapping) else type(given).__name__
+                raise RewardError(
+                    f"reward of {owner} must give a dictionary of the terms {', '.join(names) or 'none'}, got {got}; "
+                    "declare terms in rewards"
+                )
+            for k, name in enumerate(names):
+                terms[k] = valid_values(given[name], self.swarm, running, f"term {name!r} of {owner}")
+            total[:] = terms.sum(axis=0)
+
+        return StepReward(total, terms, fill)
 
     def succeeded(self) -> Bool:
         """Vehicles that succeed if the episode ends now: at their goals, alive and collision-free."""
@@ -200,9 +210,7 @@ class Task(RequiredMethods):
     def check(cls) -> None:
         """Raise ScenarioError for a class that lacks a required method or uses a name that is taken."""
         if missing := sorted(cls.__abstractmethods__):
-            raise ScenarioError(
-                f"task {cls.__name__} must define {', '.join(missing)}; see uuv_marl.tasks.task.RequiredMethods"
-            )
+            raise ScenarioError(f"task {cls.__name__} must define {', '.join(missing)}; see uuv_marl.tasks.Task")
         fields = [field.name for table in (cls.observed, *cls.channels.values()) for field in table]
         usual = {field.name for field in percept_table(1, 1)}
         for where, names, taken in (

@@ -16,7 +16,7 @@ from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.start import start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.tasks.maps.guidance import AHEAD_M, NUM_WALLS, PATH_FIELDS, write_walls
+from uuv_marl.tasks.maps.guidance import AHEAD_M, PATH_FIELDS, in_axes, path_terms
 from uuv_marl.tasks.maps.walls import INTO_BANK_M, Range, banks, between, joined, wall
 from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.tasks.reward import Terms
@@ -27,12 +27,6 @@ _BEFORE_M = 5.0
 _RIGHT_OF_WAY = PerceptField(
     "right_of_way", (1,), FLAG, "1 if the group that goes first has passed, or for its vehicles; else 0"
 )
-
-
-def in_axes(vectors: Float64, axes: Float64) -> Float64:
-    """Vectors in axes that are turned by angles, given as cosine and sine, shape (..., 2) both."""
-    (x, y), (c, s) = np.moveaxis(vectors, -1, 0), np.moveaxis(axes, -1, 0)
-    return np.stack([c * x + s * y, c * y - s * x], axis=-1)
 
 
 def _through(place: Float64, goal: Float64, at: Float64 | float) -> Float64:
@@ -174,14 +168,10 @@ class TwoSwarms(Reach):
         point = np.stack([side * np.maximum(along + AHEAD_M, -edge), np.broadcast_to(at, side.shape)], axis=2)
         point = np.where((along + AHEAD_M > edge)[:, :, None], goal, point)
         to_come = (side > 0.0) & swarm.state.alive & ~swarm.state.collided & (along < edge)
-        walls = np.zeros((*side.shape, NUM_WALLS, 2))
-        write_walls(swarm.state, swarm.world_map, swarm.heading, walls)
-        return {
-            "path": in_axes(in_axes(point - place, turn * [1.0, -1.0]), swarm.heading),
-            "path_length": np.where(along < 0.0, _through(place, goal, at), swarm.facts.away)[:, :, None],
-            "path_walls": walls,
-            "right_of_way": ((side > 0.0) | ~to_come.any(axis=1, keepdims=True))[:, :, None].astype(np.float64),
-        }
+        first = (side > 0.0) | ~to_come.any(axis=1, keepdims=True)
+        length = np.where(along < 0.0, _through(place, goal, at), swarm.facts.away)
+        terms = path_terms(swarm, in_axes(point - place, turn * [1.0, -1.0]), length)
+        return {**terms, "right_of_way": first[:, :, None].astype(np.float64)}
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also the columns."""

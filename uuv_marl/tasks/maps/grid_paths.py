@@ -31,16 +31,10 @@ class MapGrid(NamedTuple):
     """Along x."""
     columns: int
 
-    def cells(self, x: Float64, y: Float64) -> tuple[Int64, Int64]:
-        """Rows and columns of the cells nearest to places [m], shape (place,)."""
-        row = np.minimum(np.maximum(np.rint((x - self.x) / CELL_M), 0), self.rows - 1)
-        column = np.minimum(np.maximum(np.rint((y - self.y) / CELL_M), 0), self.columns - 1)
-        return row.astype(np.int64), column.astype(np.int64)
-
-    def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Row and column of the cell nearest to a place [m]."""
-        row, column = self.cells(np.array([x]), np.array([y]))
-        return int(row[0]), int(column[0])
+    def cell(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Row and column of the cell nearest to a place [m], or, for arrays of places, arrays of them."""
+        row, column = np.rint((x - self.x) / CELL_M), np.rint((y - self.y) / CELL_M)
+        return np.clip(row, 0, self.rows - 1).astype(np.int64), np.clip(column, 0, self.columns - 1).astype(np.int64)
 
 
 def free_cells(discs: Float64, grid: MapGrid, clearance: float) -> Bool:

@@ -2,11 +2,15 @@
 
 import math
 
+import numpy as np
+
 from uuv_marl.percept import LENGTH, POSITION, PerceptField
 from uuv_marl.sim.arrays import State, WorldMap
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid
-from uuv_marl.types import Float64
+from uuv_marl.sim.swarm import Swarm
+from uuv_marl.tasks.maps.grid_paths import CELL_M
+from uuv_marl.tasks.reward import Terms
+from uuv_marl.types import Float64, Int64
 
 NUM_WALLS = 8
 """Nearest walls in the channel. Assumed: all that a hull can reach within a second or two."""
@@ -53,54 +57,52 @@ def point_ahead(field: Float64, row: int, column: int) -> tuple[int, int]:
 
 
 @compiled
-def nearest_walls(pose: Float64, c: float, s: float, discs: Float64, out: Float64) -> None:
-    """Fill ``out`` with vectors to the nearest surfaces in the body frame [m], nearest first, shape (wall, 2).
+def move_ahead(path_cost: Float64, row: Int64, column: Int64) -> None:
+    """Replace rows and columns of vehicles' cells by those of their ``point_ahead``, shape (world, vehicle).
 
-    ``pose``: north, east [m], shape (at least 2,); c, s: cosine and sine of the heading; ``discs``: north, east and
-    radius [m], shape (disc, 3).
+    ``path_cost``: remaining cost from each cell, high near walls, shape (world, row, column).
     """
-    num_found, out[:] = 0, 0.0
-    for m in range(discs.shape[0]):
-        x, y = discs[m, 0] - pose[0], discs[m, 1] - pose[1]
-        away = max(math.hypot(x, y), _TOUCH_M)
-        gap = max(away - discs[m, 2], _TOUCH_M)
-        if num_found == out.shape[0] and gap >= math.hypot(out[num_found - 1, 0], out[num_found - 1, 1]):
-            continue
-        num_found = min(num_found + 1, out.shape[0])
-        k = num_found - 1
-        while k > 0 and math.hypot(out[k - 1, 0], out[k - 1, 1]) > gap:
-            out[k, 0], out[k, 1] = out[k - 1, 0], out[k - 1, 1]
-            k -= 1
-        out[k, 0], out[k, 1] = (c * x + s * y) * gap / away, (c * y - s * x) * gap / away
+    for w in range(row.shape[0]):
+        for v in range(row.shape[1]):
+            row[w, v], column[w, v] = point_ahead(path_cost[w], row[w, v], column[w, v])
 
 
 @compiled
-def write_path(
-    state: State, world_map: WorldMap, heading: Float64, turn: Float64, path_cost: Float64, grid: MapGrid,
-    path: Float64, walls: Float64,
-) -> None:  # fmt: skip
-    """Fill ``path`` (world, vehicle, 2) and ``walls`` (world, vehicle, wall, 2), body frame [m].
+def nearest_walls(state: State, world_map: WorldMap, heading: Float64, walls: Float64) -> None:
+    """Fill ``walls`` with vectors to the nearest surfaces in the body frame [m], nearest first; zero before.
 
-    ``heading`` (world, vehicle, 2) and ``turn`` of the map (world, 2) are cosine and sine; ``path_cost``: remaining
-    cost from each cell, high near walls, shape (world, row, column).
+    ``walls`` has shape (world, vehicle, wall, 2); ``heading``: cosine and sine, shape (world, vehicle, 2).
     """
-    for w in range(path.shape[0]):
-        turn_c, turn_s, discs = turn[w, 0], turn[w, 1], world_map.obstacles[w, : world_map.num_obstacles[w]]
-        for v in range(path.shape[1]):
-            pose, c, s = state.eta[w, v], heading[w, v, 0], heading[w, v, 1]
-            x, y = turn_c * pose[0] + turn_s * pose[1], turn_c * pose[1] - turn_s * pose[0]
-            row, column = round((x - grid.x) / CELL_M), round((y - grid.y) / CELL_M)
-            i, j = point_ahead(path_cost[w], min(max(row, 0), grid.rows - 1), min(max(column, 0), grid.columns - 1))
-            x, y = grid.x + i * CELL_M - x, grid.y + j * CELL_M - y
-            x, y = turn_c * x - turn_s * y, turn_s * x + turn_c * y
-            path[w, v, 0], path[w, v, 1] = c * x + s * y, c * y - s * x
-            nearest_walls(pose, c, s, discs, walls[w, v])
-
-
-@compiled
-def write_walls(state: State, world_map: WorldMap, heading: Float64, walls: Float64) -> None:
-    """Fill ``walls`` alone; arguments as in ``write_path``."""
     for w in range(walls.shape[0]):
         for v in range(walls.shape[1]):
-            c, s, discs = heading[w, v, 0], heading[w, v, 1], world_map.obstacles[w, : world_map.num_obstacles[w]]
-            nearest_walls(state.eta[w, v], c, s, discs, walls[w, v])
+            c, s, out, num_found = heading[w, v, 0], heading[w, v, 1], walls[w, v], 0
+            for m in range(world_map.num_obstacles[w]):
+                disc = world_map.obstacles[w, m]
+                x, y = disc[0] - state.eta[w, v, 0], disc[1] - state.eta[w, v, 1]
+                away = max(math.hypot(x, y), _TOUCH_M)
+                gap = max(away - disc[2], _TOUCH_M)
+                if num_found == out.shape[0] and gap >= math.hypot(out[num_found - 1, 0], out[num_found - 1, 1]):
+                    continue
+                num_found = min(num_found + 1, out.shape[0])
+                k = num_found - 1
+                while k > 0 and math.hypot(out[k - 1, 0], out[k - 1, 1]) > gap:
+                    out[k, 0], out[k, 1] = out[k - 1, 0], out[k - 1, 1]
+                    k -= 1
+                out[k, 0], out[k, 1] = (c * x + s * y) * gap / away, (c * y - s * x) * gap / away
+
+
+def in_axes(vectors: Float64, axes: Float64) -> Float64:
+    """Vectors in axes that are turned by angles, given as cosine and sine, shape (..., 2) both."""
+    (x, y), (c, s) = np.moveaxis(vectors, -1, 0), np.moveaxis(axes, -1, 0)
+    return np.stack([c * x + s * y, c * y - s * x], axis=-1)
+
+
+def path_terms(swarm: Swarm, ahead: Float64, length: Float64) -> Terms:
+    """The values of ``PATH_FIELDS``.
+
+    ``ahead``: vectors to points ahead, north and east [m], shape (world, vehicle, 2); ``length`` of the paths [m],
+    shape (world, vehicle).
+    """
+    walls = np.zeros((*length.shape, NUM_WALLS, 2))
+    nearest_walls(swarm.state, swarm.world_map, swarm.heading, walls)
+    return {"path": in_axes(ahead, swarm.heading), "path_length": length[:, :, None], "path_walls": walls}

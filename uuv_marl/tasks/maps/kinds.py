@@ -1,6 +1,7 @@
 """Kinds of maps of ``hard_water``: walls of discs in closed water. Constants are assumed, and were tried by hand."""
 
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
@@ -50,10 +51,8 @@ class Pocket(MapKind):
         sides = [wall(a, b, radius) for a, b in pairwise(corners)]
         if rng.random() < self.closed:
             which = side(rng)
-            sides.append(wall(
-                corners[3] if which > 0 else corners[0],
-                (between(rng, (front, x)), which * (water.half + INTO_BANK_M)), radius,
-            ))  # fmt: skip
+            bank = between(rng, (front, x)), which * (water.half + INTO_BANK_M)
+            sides.append(wall(corners[3] if which > 0 else corners[0], bank, radius))
         return joined(*sides)
 
 
@@ -102,6 +101,7 @@ class Gate(MapKind):
 class Forest(MapKind):
     """As many single discs as find a place."""
 
+    blocks: ClassVar[bool] = False  # paths lead between the discs everywhere
     gap_m: Range
     """Smallest gap between two of them."""
 
@@ -112,10 +112,6 @@ class Forest(MapKind):
         high = np.array([water.length - _FOREST_CLEAR_M - self.radius_m[1], water.half, self.radius_m[1]])
         placed = np.zeros((_FOREST_DISCS, 3))
         return placed[: scatter(low + (high - low) * tried, gap, placed)]
-
-    def blocks(self) -> bool:
-        """False: paths lead between the discs everywhere."""
-        return False
 
 
 class Maze(MapKind):

@@ -5,12 +5,11 @@ ahead, and the banks lie at ``half`` to each side. The complete map is then turn
 """
 
 from itertools import pairwise
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import AfterValidator
 
-from uuv_marl.scenario.fields import NonNegative, Positive, Section, within
+from uuv_marl.scenario.fields import ORDERED, NonNegative, Positive, Section, within
 from uuv_marl.types import Float64
 
 STEP = 1.6
@@ -20,15 +19,9 @@ INTO_BANK_M = 4.0
 pass behind it."""
 
 
-def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
-    if pair[0] > pair[1]:
-        raise ValueError(f"must be [low, high] with low <= high, got {list(pair)}")
-    return pair
-
-
-Range = Annotated[tuple[NonNegative, NonNegative], AfterValidator(_ordered)]
+Range = Annotated[tuple[NonNegative, NonNegative], ORDERED]
 """Lowest and highest value, between which each map samples its own."""
-Span = Annotated[tuple[Positive, Positive], AfterValidator(_ordered)]
+Span = Annotated[tuple[Positive, Positive], ORDERED]
 """The same, above 0."""
 
 Share = Annotated[float, within(0, 1)]
@@ -54,16 +47,14 @@ class Basin(NamedTuple):
 class MapKind(Section):
     """Numbers of one kind of map."""
 
+    blocks: ClassVar[bool] = True
+    """Whether a map is accepted only if the straight path to the goal is blocked."""
     radius_m: Span
     """Radius of the discs that its walls are made of."""
 
     def walls(self, rng: np.random.Generator, water: Basin) -> Float64:
         """Discs, x, y and radius [m], shape (disc, 3). The same generator gives the same walls."""
         raise NotImplementedError
-
-    def blocks(self) -> bool:
-        """Whether a map is accepted only if the straight path to the goal is blocked."""
-        return True
 
 
 def between(rng: np.random.Generator, bounds: tuple[float, float]) -> float:
