@@ -12,7 +12,7 @@ from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, aim
-from uuv_marl.envs.drawing.frame import Frame, Panel, _numbers, pixels
+from uuv_marl.envs.drawing.frame import Panel, _numbers, draw, pixels
 from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.envs.drawing.scene import TRAIL_S, SceneHistory
 from uuv_marl.envs.solo import SoloEnv
@@ -93,7 +93,7 @@ def test_cameras_show_what_they_promise(scenario):
 def test_a_long_title_stays_in_its_own_panel():
     scene, _, _ = played(seconds=0.0)
     pictures = [
-        pixels(Frame((800, 400), 2).draw([Panel(name, scene), Panel("scout", scene)], "follow"))
+        pixels(draw([Panel(name, scene), Panel("scout", scene)], (800, 400), "follow", columns=2))
         for name in ("scout", "a/very/long/path/to/a/checkpoint/of/a/policy.safetensors at 101 s")
     ]
     right = np.s_[:, 400:]

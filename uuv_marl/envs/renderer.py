@@ -37,7 +37,7 @@ class Renderer:
         self._swarm = swarm
         self._look = look(options, swarm.num_vehicles, sonar_of)
         self._memory = SceneHistory(swarm)
-        self._canvas: Any = None
+        self._shown: Any = None
 
     def draw(self, world: int = 0) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
@@ -46,12 +46,11 @@ class Renderer:
         self._memory.note()
         if self.mode == "human":
             return self._window().show(self._memory.scene, wait=False)
-        from uuv_marl.envs.drawing.frame import Frame, Panel, pixels  # noqa: PLC0415
+        from uuv_marl.envs.drawing.frame import Panel, draw, pixels  # noqa: PLC0415
 
-        self._canvas = self._canvas or Frame(self._look.size)
         name, scene = self._swarm.scenario.name, self._memory.scene(self._look.sonar_of, world)
         title = name if self._swarm.num_worlds == 1 else f"{name}, world {world}"
-        return pixels(self._canvas.draw([Panel(title, scene)], self._look.camera))
+        return pixels(draw([Panel(title, scene)], self._look.size, self._look.camera))
 
     def update(self) -> None:
         """Record the worlds after a reset or a step, and draw them in the window, if there is one."""
@@ -62,17 +61,17 @@ class Renderer:
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        if self._canvas is not None and self.mode == "human":
-            self._canvas.close()
-        self._canvas = None
+        if self._shown is not None:
+            self._shown.close()
+        self._shown = None
 
     def _window(self) -> Any:
-        if self._canvas is None:
+        if self._shown is None:
             from uuv_marl.envs.drawing.window import Window  # noqa: PLC0415
 
-            self._canvas = Window(self._swarm.scenario, self._look, self.fps)
-        return self._canvas
+            self._shown = Window(self._swarm.scenario, self._look, self.fps)
+        return self._shown
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle and deepcopy: everything but the window."""
-        return {**self.__dict__, "_canvas": None}
+        return {**self.__dict__, "_shown": None}

@@ -148,10 +148,6 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         self._batch.check_reset("render()")
         return tuple(self._renderer.draw(world) for world in range(self.num_envs))
 
-    def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - Gymnasium's signature
-        """Free the canvas."""
-        self._renderer.close()
-
 
 def _autoreset_mode(mode_name: AutoresetMode | str) -> AutoresetMode:
     """The mode of this name or value."""

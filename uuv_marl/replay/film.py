@@ -13,7 +13,7 @@ from PIL import Image
 from uuv_marl.atomic import replacing, writing
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import CAMERAS
-from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
+from uuv_marl.envs.drawing.frame import Panel, draw, pixels
 from uuv_marl.errors import ReplayError
 from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
@@ -74,10 +74,10 @@ def write_film(
             moments = np.linspace(0.0, longest, _MOMENTS).tolist()
             scenes = [(one, one.scene_at(now, sonar_of), now) for one in recordings for now in moments]
             panels = [Panel(f"{one.policy} at {scene.time_s:.0f} s", scene, now) for one, scene, now in scenes]
-            Image.fromarray(pixels(Frame(size, _MOMENTS).draw(panels, camera, heading))).save(partial, optimize=True)
+            still = pixels(draw(panels, size, camera, heading, columns=_MOMENTS))
+            Image.fromarray(still).save(partial, optimize=True)
             return
-        frame, is_gif = Frame(size, len(recordings), grid=suffix != ".gif"), suffix == ".gif"
-        fps, speed = _FPS[suffix], speed or max(1.0, round(longest / _LENGTH_S[suffix]))
+        is_gif, fps, speed = suffix == ".gif", _FPS[suffix], speed or max(1.0, round(longest / _LENGTH_S[suffix]))
         heading += f", {speed:.3g} times as fast" if speed != 1.0 else ""
         num = int(np.ceil(longest / speed * fps)) + 1
 
@@ -88,7 +88,7 @@ def write_film(
                     Panel(one.policy, scene._replace(trail=[]) if is_gif else scene)
                     for one, scene in zip(recordings, scenes, strict=True)
                 ]
-                yield pixels(frame.draw(panels, camera, heading))
+                yield pixels(draw(panels, size, camera, heading, columns=len(panels), grid=not is_gif))
                 if progress:
                     progress((k + 1) / num)
 
