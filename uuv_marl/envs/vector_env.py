@@ -188,5 +188,5 @@ def vector_env(
         options: the other arguments of ``uuv_marl.parallel_env``, such as ``for_policy``. ``infos["agent_reward"]`` is
             the ``reward`` of each vehicle; a row's is the mean over all vehicles, with ``team`` that of ``dense``.
     """
-    batch = make_batched_env(scenario, num_envs, order=("num_envs", "scenario"), keep_terms=info_terms, **options)
+    batch = make_batched_env(scenario, num_envs, number="num_envs", keep_terms=info_terms, **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)
