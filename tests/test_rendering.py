@@ -12,7 +12,7 @@ from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, aim
-from uuv_marl.envs.drawing.frame import Frame, Panel, _numbers, pixels
+from uuv_marl.envs.drawing.frame import Panel, _numbers, draw, pixels
 from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.envs.drawing.scene import TRAIL_S, SceneHistory
 from uuv_marl.envs.solo import SoloEnv
@@ -27,12 +27,12 @@ def played(scenario=STARTER, policy="bio_inspired", seconds=10.0, sonar_of=None,
     actor = make_policy(policy, batch.swarm.scenario)
     batch.reset(seed)
     actor.reset(seed)
-    memory = SceneHistory(batch)
-    memory.note(batch)
+    memory = SceneHistory(batch.swarm)
+    memory.note()
     while batch.swarm.facts.time_s[0] < seconds - 1e-6:
         batch.step(actor.act(batch.swarm.percept))
-        memory.note(batch)
-    return memory.scene(batch, 0, sonar_of), batch, memory
+        memory.note()
+    return memory.scene(sonar_of), batch, memory
 
 
 def colour(picture, at):
@@ -63,7 +63,7 @@ def test_the_bow_points_where_the_vehicle_heads():
     scene, _, _ = played(seconds=0.0)
     heading = np.array([0.0, np.pi / 2, np.pi, -np.pi / 2, 0.7])
     place = np.array([[0.0, -60.0], [0.0, -30.0], [0.0, 0.0], [0.0, 30.0], [0.0, 60.0]])
-    scene = scene._replace(position=place, heading=heading, trail=np.zeros((0, 5, 2)), references=place[:1] + 90.0)
+    scene = scene._replace(position=place, heading=heading, trail=[], references=place[:1] + 90.0)
     camera = Camera(np.zeros(2), 4.0, SIZE)
     blue = np.abs(pixels(Painter(SIZE, grid=False).paint(scene, camera)).astype(int) - ink.BLUE).max(axis=2) < 40
     for at, psi in zip(camera.pixels(place), heading, strict=True):
@@ -93,7 +93,7 @@ def test_cameras_show_what_they_promise(scenario):
 def test_a_long_title_stays_in_its_own_panel():
     scene, _, _ = played(seconds=0.0)
     pictures = [
-        pixels(Frame((800, 400), 2).draw([Panel(name, scene), Panel("scout", scene)], "follow"))
+        pixels(draw([Panel(name, scene), Panel("scout", scene)], (800, 400), "follow", columns=2))
         for name in ("scout", "a/very/long/path/to/a/checkpoint/of/a/policy.safetensors at 101 s")
     ]
     right = np.s_[:, 400:]
@@ -103,9 +103,9 @@ def test_a_long_title_stays_in_its_own_panel():
 
 def test_a_scene_remembers_trails_and_collisions_until_its_world_is_reset():
     batch = make_batched_env(STARTER, 2)
-    memory = SceneHistory(batch)
+    memory = SceneHistory(batch.swarm)
     batch.reset(0)
-    memory.note(batch)
+    memory.note()
     start = batch.swarm.state.eta[:, :, :2].copy()
     state = batch.swarm.state
     for k in range(300):
@@ -113,22 +113,22 @@ def test_a_scene_remembers_trails_and_collisions_until_its_world_is_reset():
             state.eta[0, :2] = [[-50.0, 0.0, 0.0], [-46.0, 0.0, np.pi]]
             state.nu[0, :2] = [4.0, 0.0, 0.0]
         batch.step(np.zeros((2, 5, 2), np.float32))
-        memory.note(batch)
-    scene = memory.scene(batch, 0, None)
+        memory.note()
+    scene = memory.scene()
     assert scene.collisions == int(batch.collisions[0]) > 0
     assert len(scene.trail) == TRAIL_S
     assert 10.0 < scene.hits[0, 2] < 11.0
     np.testing.assert_allclose(scene.hits[0, :2], [-48.0, 0.0], atol=2.0)
-    assert not memory.scene(batch, 1, None).hits.size
-    memory.note(batch)
-    assert len(memory.scene(batch, 0, None).trail) == TRAIL_S
+    assert not memory.scene(world=1).hits.size
+    memory.note()
+    assert len(memory.scene().trail) == TRAIL_S
     batch.reset(worlds=[0])
-    memory.note(batch)
-    fresh = memory.scene(batch, 0, None)
+    memory.note()
+    fresh = memory.scene()
     assert not fresh.hits.size
     assert len(fresh.trail) <= 1
-    assert len(memory.scene(batch, 1, None).trail) == TRAIL_S
-    assert not np.allclose(start[1], memory.scene(batch, 1, None).position)
+    assert len(memory.scene(world=1).trail) == TRAIL_S
+    assert not np.allclose(start[1], memory.scene(world=1).position)
 
 
 def test_the_numbers_are_those_of_the_swarm():
@@ -160,7 +160,7 @@ def test_the_sonar_shown_is_what_the_vehicle_hears():
     without = pixels(Painter(SIZE).paint(scene._replace(sonar=None), camera)).astype(int)
     assert not (np.abs(without - ink.PINK).max(axis=2) < 20).any()
     batch.swarm.state.alive[0, 10] = False
-    assert memory.scene(batch, 0, 10).sonar is None
+    assert memory.scene(10).sonar is None
 
 
 def test_every_interface_draws_as_its_options_say_and_a_copy_alike():

@@ -19,7 +19,7 @@ from tests.swarms import piloted, run_of
 from uuv_marl.benchmark import runner
 from uuv_marl.cli import app
 from uuv_marl.replay import encode
-from uuv_marl.replay.encode import CODINGS, payload, unwrapped
+from uuv_marl.replay.encode import UNITS, payload, unwrapped
 from uuv_marl.replay.record import record
 
 ROUGH = {
@@ -40,8 +40,8 @@ def test_a_recording_is_the_benchmarks_run():
     run, recording = run_of("sff", scenario, seed=3), record(scenario, "sff", 3)
     assert recording.metrics == run.metrics
     np.testing.assert_array_equal(recording.time_s, run.series["time_s"])
-    np.testing.assert_array_equal(recording.waypoints, run.waypoints)
-    np.testing.assert_array_equal(recording.obstacles, run.obstacles)
+    np.testing.assert_array_equal(recording.scenes[-1].waypoints.astype(np.float32), run.waypoints)
+    np.testing.assert_array_equal(recording.scenes[-1].obstacles.astype(np.float32), run.obstacles)
     at = np.searchsorted(recording.time_s, run.routes.time_s)
     np.testing.assert_array_equal(recording.position[at], run.routes.position)
     np.testing.assert_array_equal(recording.heading[at], run.routes.heading)
@@ -50,7 +50,7 @@ def test_a_recording_is_the_benchmarks_run():
     np.testing.assert_allclose((recording.force**2).mean(axis=1), run.series["effort"], rtol=1e-5, atol=1e-7)
     assert recording.force.max() <= 1.0 + 1e-6
     centre = recording.position.mean(axis=1)
-    error = np.hypot(*(centre - recording.references[:, 0]).T)
+    error = np.hypot(*(centre - [scene.references[0] for scene in recording.scenes]).T)
     np.testing.assert_allclose(recording.series["centre_error_m"], error, atol=1e-3)
 
 
@@ -81,14 +81,15 @@ def test_every_contact_is_an_event(changes):
         recording = record(rough(**changes), "random", seed)
         hits = [event for event in recording.events if event.kind in ("collision", "obstacle")]
         seen |= {event.kind for event in hits}
-        assert len(hits) == recording.metrics["collisions"] == recording.series["collisions"][-1]
+        assert recording.metrics["collisions"] == recording.series["collisions"][-1]
+        began = recording.time_s[1:][np.diff(recording.series["collisions"]) > 0]
+        np.testing.assert_array_equal(began, np.unique([event.time_s for event in hits]))
         for event in hits:
             t = np.searchsorted(recording.time_s, event.time_s)
-            assert recording.series["collisions"][t] > recording.series["collisions"][t - 1]
-            assert len(event.vehicles) == (2 if event.kind == "collision" else 1)
             if event.kind == "collision":
+                assert len(event.vehicles) > 1
                 assert (recording.spacing[t, list(event.vehicles)] < 2.8).all()
-        gone = [event.vehicles[0] for event in recording.events if event.kind == "lost"]
+        gone = [i for event in recording.events if event.kind == "lost" for i in event.vehicles]
         assert len(gone) == len(set(gone)) == recording.metrics["vehicles_lost"]
         assert np.isnan(recording.position[-1, gone]).all()
         times = [event.time_s for event in recording.events]
@@ -129,13 +130,10 @@ def decoded(recordings, folder):
 
 
 def assert_coded(name, got, values):
-    """Within the resolution, exact to half a unit at every stride, and missing where the recording's is."""
-    coding = CODINGS[name]
+    """Within half a unit, and missing where the recording's is."""
     np.testing.assert_array_equal(np.isnan(got), np.isnan(values))
-    off = np.abs(got.astype(float) - values)
     last_bit = 1e-6 * max(1.0, np.nanmax(np.abs(values), initial=0.0))
-    assert np.nanmax(off, initial=0.0) <= coding.resolution + last_bit, name
-    assert np.nanmax(off[:: coding.stride], initial=0.0) <= coding.unit / 2 + last_bit, name
+    assert np.nanmax(np.abs(got.astype(float) - values), initial=0.0) <= UNITS[name] / 2 + last_bit, name
 
 
 EPISODES = {
@@ -151,15 +149,16 @@ EPISODES = {
 def test_a_browser_reads_the_recording(tmp_path):
     recordings = [record(*case) for case in EPISODES.values()]
     for recording, arrays in zip(recordings, decoded(recordings, tmp_path), strict=True):
-        for name in ("time_s", "waypoints", "obstacles"):
-            np.testing.assert_array_equal(arrays[name], getattr(recording, name))
+        discs = np.array([scene.obstacles for scene in recording.scenes], np.float32)
+        np.testing.assert_array_equal(arrays["time_s"], recording.time_s)
+        np.testing.assert_array_equal(arrays["obstacles"], discs[-1])
         for name, values in recording.series.items():
             np.testing.assert_array_equal(arrays[name], values)
-        assert_coded("reference", arrays["reference"], recording.references[:, 0])
+        assert_coded("reference", arrays["reference"], [scene.references[0] for scene in recording.scenes])
         for name in ("position", "speed", "force", "spacing"):
             assert_coded(name, arrays[name], getattr(recording, name))
-        if recording.traffic is not None:
-            assert_coded("traffic", arrays["traffic"], recording.traffic)
+        if "traffic" in arrays:
+            assert_coded("traffic", arrays["traffic"], discs[:, :, :2])
         assert ("traffic" in arrays) == recording.scenario.traffic.moves
         inspected = list(recording.inspections)
         others = [i for i in range(recording.heading.shape[1]) if i not in inspected]

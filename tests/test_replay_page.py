@@ -16,7 +16,7 @@ from tests.swarms import run_of
 from uuv_marl import load_scenario
 from uuv_marl.cli import app
 from uuv_marl.replay import demo
-from uuv_marl.replay.encode import CODINGS, payload
+from uuv_marl.replay.encode import UNITS, payload
 from uuv_marl.replay.html import html_of
 from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
@@ -110,9 +110,7 @@ def test_the_page_hears_what_the_engine_recorded(read, recordings):
             for sonar, hearing in zip(recording.inspections.values(), number["hearing"], strict=True):
                 assert [sector["detected"] for sector in hearing] == sonar.detected_index[at].tolist()
                 echoes = np.array([sector["echo"] or 0.0 for sector in hearing if sector["echoAt"]])
-                assert echoes == pytest.approx(
-                    np.nan_to_num(sonar.echo_range[at]), abs=CODINGS["echo_range"].resolution
-                )
+                assert echoes == pytest.approx(np.nan_to_num(sonar.echo_range[at]), abs=UNITS["echo_range"] / 2 + 1e-4)
 
 
 @needs_node
@@ -121,9 +119,9 @@ def test_the_page_knows_each_groups_goal_and_the_circles_of_a_task(tmp_path):
     recording = record(load_scenario("two_swarms", overrides=short), "idle", 0)
     write_page([recording], tmp_path / "replay.html")
     shown = json.loads(node(HERE / "page_numbers.mjs", tmp_path / "replay.html", 2.0))["numbers"][0][0]
-    goals = np.array([way[-1] for _, way in recording.groups.paths.values()])
+    goals = np.array([way[-1] for _, way in recording.scenes[0].groups.paths.values()])
     np.testing.assert_allclose(shown["references"], goals, atol=0.02)
-    np.testing.assert_array_equal(np.array(shown["marks"]).reshape(-1, 3), recording.marks[4])
+    np.testing.assert_array_equal(np.array(shown["marks"]).reshape(-1, 3), recording.scenes[4].marks.astype(np.float32))
 
 
 @needs_node
@@ -225,7 +223,7 @@ def test_a_browser_draws_it_in_any_width(view, seen):
 def test_page_of_54_vehicles_is_small_and_asks_for_nothing(tmp_path):
     write_page([record(load_scenario("single_obstacle"), "bio_inspired", 0)], tmp_path / "replay.html")
     text = (tmp_path / "replay.html").read_text()
-    assert (tmp_path / "replay.html").stat().st_size < 250_000
+    assert (tmp_path / "replay.html").stat().st_size < 300_000
     assert "default-src 'none'" in text
     assert "The MIT License" in text
     assert not re.findall(r"""(?:src|href)=["'](?!data:)|url\(|@import""", re.sub(r"<script.*?</script>", "", text))

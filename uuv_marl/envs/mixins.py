@@ -28,7 +28,7 @@ class EnvMixin:
     ) -> None:  # fmt: skip
         """Wrap these worlds; ``sonar_of``: index of the inspected vehicle if the options name none."""
         self._batch = batch
-        self._renderer = Renderer(batch, render_mode, self.metadata["render_modes"], options, sonar_of)
+        self._renderer = Renderer(batch.swarm, render_mode, self.metadata["render_modes"], options, sonar_of)
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": self._renderer.fps}
 

@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.envs.drawing.options import RenderOptions, look
-from uuv_marl.envs.drawing.scene import Scene, SceneHistory
+from uuv_marl.envs.drawing.scene import SceneHistory
+from uuv_marl.sim.swarm import Swarm
 
 
 class Renderer:
     """Draws the worlds of an environment.
 
     Args:
-        batch: the worlds.
+        swarm: the worlds.
         render_mode: one of ``modes``, or None.
         modes: ``rgb_array``, and ``human`` if the environment can show a window.
         options: see ``RenderOptions``.
@@ -24,7 +24,7 @@ class Renderer:
 
     def __init__(
         self,
-        batch: BatchedEnv,
+        swarm: Swarm,
         render_mode: str | None,
         modes: Sequence[str],
         options: RenderOptions | None = None,
@@ -33,49 +33,45 @@ class Renderer:
         if render_mode is not None and render_mode not in modes:
             raise ValueError(f"render_mode must be one of {list(modes)} or None, got {render_mode!r}")
         self.mode = render_mode
-        self.fps = round(1.0 / batch.swarm.scenario.timing.decision_period_s) or 1
-        self._batch = batch
-        self._look = look(options, batch.swarm.num_vehicles, sonar_of)
-        self._memory = SceneHistory(batch)
-        self._canvas: Any = None
+        self.fps = round(1.0 / swarm.scenario.timing.decision_period_s) or 1
+        self._swarm = swarm
+        self._look = look(options, swarm.num_vehicles, sonar_of)
+        self._memory = SceneHistory(swarm)
+        self._shown: Any = None
 
     def draw(self, world: int = 0) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
         if self.mode is None:
             raise RuntimeError("render() needs a render_mode: make the environment with render_mode='rgb_array'")
-        self._memory.note(self._batch)
+        self._memory.note()
         if self.mode == "human":
-            return self._window().show(self._scene, wait=False)
-        from uuv_marl.envs.drawing.frame import Frame, Panel, pixels  # noqa: PLC0415
+            return self._window().show(self._memory.scene, wait=False)
+        from uuv_marl.envs.drawing.frame import Panel, draw, pixels  # noqa: PLC0415
 
-        self._canvas = self._canvas or Frame(self._look.size)
-        name, worlds = self._batch.swarm.scenario.name, self._batch.swarm.num_worlds
-        title = name if worlds == 1 else f"{name}, world {world}"
-        return pixels(self._canvas.draw([Panel(title, self._scene(self._look.sonar_of, world))], self._look.camera))
+        name, scene = self._swarm.scenario.name, self._memory.scene(self._look.sonar_of, world)
+        title = name if self._swarm.num_worlds == 1 else f"{name}, world {world}"
+        return pixels(draw([Panel(title, scene)], self._look.size, self._look.camera))
 
     def update(self) -> None:
         """Record the worlds after a reset or a step, and draw them in the window, if there is one."""
         if self.mode is not None:
-            self._memory.note(self._batch)
+            self._memory.note()
         if self.mode == "human":
-            self._window().show(self._scene, wait=True)
+            self._window().show(self._memory.scene, wait=True)
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        if self._canvas is not None and self.mode == "human":
-            self._canvas.close()
-        self._canvas = None
-
-    def _scene(self, sonar_of: int | None, world: int = 0) -> Scene:
-        return self._memory.scene(self._batch, world, sonar_of)
+        if self._shown is not None:
+            self._shown.close()
+        self._shown = None
 
     def _window(self) -> Any:
-        if self._canvas is None:
+        if self._shown is None:
             from uuv_marl.envs.drawing.window import Window  # noqa: PLC0415
 
-            self._canvas = Window(self._batch.swarm.scenario, self._look, self.fps)
-        return self._canvas
+            self._shown = Window(self._swarm.scenario, self._look, self.fps)
+        return self._shown
 
     def __getstate__(self) -> dict[str, Any]:
         """For pickle and deepcopy: everything but the window."""
-        return {**self.__dict__, "_canvas": None}
+        return {**self.__dict__, "_shown": None}

@@ -154,5 +154,4 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         return [self._renderer.draw(world) for world in range(self._shape[0])]
 
     def close(self) -> None:
-        """Free the canvas."""
-        self._renderer.close()
+        """Nothing to close."""

@@ -56,7 +56,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         if "for_policy" in options:
             raise TypeError(f"SoloEnv takes no for_policy: the scenario suits others={others!r}; leave it out")
         options["for_policy"] = others
-        batch = make_batched_env(scenario, order=("scenario", "others"), keep_terms=info_terms, **options)
+        batch = make_batched_env(scenario, keep_terms=info_terms, **options)
         self._wrap(batch, render_mode, render_options, sonar_of=0)
         self._others = make_policy(others, self.scenario)
         self._info_terms = info_terms

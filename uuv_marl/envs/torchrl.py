@@ -49,7 +49,7 @@ class SwarmEnv(EnvMixin, EnvBase):
         device: torch.device | str = "cpu",
         **options: Unpack[EnvOptions],
     ) -> None:
-        batch = make_batched_env(scenario, num_worlds, order=("num_worlds", "scenario"), keep_terms=False, **options)
+        batch = make_batched_env(scenario, num_worlds, keep_terms=False, **options)
         super().__init__(device=device, batch_size=torch.Size([num_worlds]))
         self._batch = batch
         self._pending: list[int | None]

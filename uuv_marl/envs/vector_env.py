@@ -148,10 +148,6 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         self._batch.check_reset("render()")
         return tuple(self._renderer.draw(world) for world in range(self.num_envs))
 
-    def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - Gymnasium's signature
-        """Free the canvas."""
-        self._renderer.close()
-
 
 def _autoreset_mode(mode_name: AutoresetMode | str) -> AutoresetMode:
     """The mode of this name or value."""
@@ -192,5 +188,5 @@ def vector_env(
         options: the other arguments of ``uuv_marl.parallel_env``, such as ``for_policy``. ``infos["agent_reward"]`` is
             the ``reward`` of each vehicle; a row's is the mean over all vehicles, with ``team`` that of ``dense``.
     """
-    batch = make_batched_env(scenario, num_envs, order=("num_envs", "scenario"), keep_terms=info_terms, **options)
+    batch = make_batched_env(scenario, num_envs, number="num_envs", keep_terms=info_terms, **options)
     return SwarmVectorEnv(batch, render_mode, info_terms, autoreset_mode, render_options)

@@ -1,8 +1,11 @@
 // Episodes back from the payload of uuv_marl/replay/encode.py: arrays in SI units, NaN where a number is missing.
 
+/** The integer that stands for NaN. */
+const MISSING = -(2 ** 31);
+
 /** Episodes with `arrays.NAME = {shape, data}`, where data is a Float32Array or, of whole numbers, an Int32Array. */
 export async function decodeEpisodes(payload) {
-  if (payload.schema !== 1) throw new Error(`the page reads schema 1, and its episodes have ${payload.schema}`);
+  if (payload.schema !== 2) throw new Error(`the page reads schema 2, and its episodes have ${payload.schema}`);
   return Promise.all(payload.episodes.map(decodeEpisode));
 }
 
@@ -23,18 +26,11 @@ function refine(heading, fine, inspected) {
   }
 }
 
-async function decodeArray({ shape, dtype, scale, stride, order, missing, data }) {
-  const [rows, ...rest] = shape;
-  const columns = rest.reduce((product, size) => product * size, 1);
-  const whole = integers(await inflate(data), rows, columns, stride, order);
+async function decodeArray({ shape, dtype, unit, data }) {
+  const whole = integers(await inflate(data), shape);
   if (dtype === "int32") return { shape, data: whole };
-  if (scale === null) return { shape, data: new Float32Array(whole.buffer) };
-  const values = new Float32Array(whole.length);
-  for (let k = 0; k < values.length; k++) values[k] = whole[k] * scale;
-  if (missing !== null) {
-    integers(await inflate(missing), rows, columns, 1, 1).forEach((gone, k) => { if (gone) values[k] = NaN; });
-  }
-  return { shape, data: values };
+  if (unit === null) return { shape, data: new Float32Array(whole.buffer) };
+  return { shape, data: Float32Array.from(whole, (value) => (value === MISSING ? NaN : value * unit)) };
 }
 
 /** The bytes that were packed as text: deflated, in base64. */
@@ -46,28 +42,16 @@ export async function inflate(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** Whole numbers, time by time, from their differences: column by column, every stride-th row first. */
-function integers(bytes, rows, columns, stride, order) {
+/** Whole numbers, time by time, from their differences in time, column by column. */
+function integers(bytes, [rows, ...rest]) {
+  const columns = rest.reduce((product, size) => product * size, 1);
   const differences = signed(bytes, rows * columns);
   const whole = new Int32Array(rows * columns);
-  const column = new Int32Array(rows);
-  for (let c = 0; c < columns; c++) {
-    const sums = [0, 0, 0];
-    const coarse = Math.ceil(rows / stride);
-    for (let row = 0, k = c * coarse; row < rows; row += stride) {
-      sums[order] = differences[k++];
-      for (let j = order; j > 0; j--) sums[j - 1] = (sums[j - 1] + sums[j]) | 0;
-      column[row] = sums[0];
+  for (let column = 0, k = 0; column < columns; column++) {
+    for (let row = 0, sum = 0; row < rows; row++) {
+      sum = (sum + differences[k++]) | 0;
+      whole[row * columns + column] = sum;
     }
-    let begin = coarse * columns;
-    for (let half = stride >> 1; half > 0; half >>= 1) {
-      const finer = Math.max(0, Math.ceil((rows - half) / (2 * half)));
-      for (let row = half, k = begin + c * finer; row < rows; row += 2 * half) {
-        column[row] = between(column, row, half) + differences[k++];
-      }
-      begin += finer * columns;
-    }
-    for (let row = 0; row < rows; row++) whole[row * columns + c] = column[row];
   }
   return whole;
 }
@@ -80,13 +64,4 @@ function signed(bytes, count) {
   }
   for (let k = 0; k < count; k++) numbers[k] = (numbers[k] >>> 1) ^ -(numbers[k] & 1);
   return numbers;
-}
-
-/** What the samples of a column before and after a row say of it. */
-function between(column, row, half) {
-  const before = column[row - half];
-  const after = column[row + half];
-  if (row + half >= column.length) return before;
-  if (row < 3 * half || row + 3 * half >= column.length) return (before + after) >> 1;
-  return (9 * (before + after) - column[row - 3 * half] - column[row + 3 * half] + 8) >> 4;
 }

@@ -1,79 +1,62 @@
 """Events on a replay's time line: collisions, near misses, losses and the arrival."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from uuv_marl.replay.recording import Event
+from uuv_marl.scenario import Scenario
 from uuv_marl.types import Bool, Float32, Int32
 
 REARM_S = 2.0
 """Time for which a vehicle must keep its distance before its next near miss counts [s]."""
 
 
-def near_misses(kind: str, time_s: Float32, below: Bool) -> list[Event]:
-    """An event for each sample at which near misses begin, with these vehicles.
+class Event(NamedTuple):
+    """An event of an episode."""
 
-    ``below`` says whether a vehicle is below its limit, shape (time, vehicle).
+    time_s: float
+    kind: str
+    """``collision`` between vehicles, ``obstacle`` with an obstacle, ``near`` and ``near_obstacle`` where spacing
+    falls below s_u or clearance below s_o, ``lost``, or ``arrived`` for the swarm."""
+    vehicles: tuple[int, ...]
+    """Indices of all vehicles to which this happens at this time; empty for the swarm."""
+
+
+def events_of(
+    scenario: Scenario, time_s: Float32, alive: Bool, collisions: Int32, spacing: Float32, clearance: Float32,
+    task_time_s: float | None,
+) -> list[Event]:  # fmt: skip
+    """All events, sorted by time.
+
+    Arrays have shape (time, vehicle): ``collisions``, ``spacing`` and ``clearance`` [m] are those since the sample
+    before. A vehicle whose hull starts to overlap an obstacle has collided with that, others with each other.
     """
-    events: list[Event] = []
-    last = np.full(below.shape[1], -np.inf)
-    for now, low in zip(time_s.tolist(), below, strict=True):
-        began = np.flatnonzero(low & (now - last > REARM_S))
-        if began.size:
-            events.append(Event(now, kind, tuple(began.tolist())))
-        last[low] = now
-    return events
+    limits, inside = scenario.constraints, clearance < scenario.collision.hull_radius_m
+    hit = (collisions > 0) & inside & ~_before(inside)
+    happened = {
+        "collision": collisions > hit,
+        "obstacle": hit,
+        "near": _anew(time_s, spacing < limits.s_u_m),
+        "near_obstacle": _anew(time_s, clearance < limits.s_o_m),
+        "lost": _before(alive) & ~alive,
+    }
+    events = [
+        Event(float(time_s[t]), kind, tuple(np.flatnonzero(vehicles[t]).tolist()))
+        for kind, vehicles in happened.items()
+        for t in np.flatnonzero(vehicles.any(axis=1))
+    ]
+    if task_time_s is not None:
+        events.append(Event(task_time_s, "arrived", ()))
+    return sorted(events, key=lambda event: event.time_s)
 
 
-def collisions(
-    time_s: Float32, began: Int32, clearance: Float32, position: Float32, hull_radius_m: float
-) -> list[Event]:
-    """An event for each collision that the simulator counted.
-
-    The simulator counts collisions for each vehicle without the other party: a vehicle whose hull starts to overlap an
-    obstacle has collided with that, and the others with each other.
-
-    Args:
-        time_s: shape (time,).
-        began: collisions since the previous sample, shape (time, vehicle).
-        clearance: smallest distance to an obstacle's surface since the previous sample [m], shape (time, vehicle).
-        position: position, also of vehicles lost in the collision [m], shape (time, vehicle, 2).
-        hull_radius_m: distance to an obstacle's surface below which they collide; twice this for two vehicles.
-    """
-    events: list[Event] = []
-    inside = clearance < hull_radius_m
-    for t in np.flatnonzero(began.any(axis=1)).tolist():
-        now, left = float(time_s[t]), began[t].copy()
-        hit = np.flatnonzero((left > 0) & inside[t] & ~inside[t - 1]).tolist()
-        left[hit] -= 1
-        while left.any():
-            i = int(left.argmax())
-            j = _partner(i, left, position[t - 1 : t + 1], 2 * hull_radius_m)
-            if j is None:
-                hit += [i] * int(left[i])
-                left[i] = 0
-            else:
-                events.append(Event(now, "collision", (min(i, j), max(i, j))))
-                left[[i, j]] -= 1
-        events += [Event(now, "obstacle", (i,)) for i in hit]
-    return events
+def _before(values: Bool) -> Bool:
+    """The values one sample earlier, False at first."""
+    return np.vstack([np.zeros_like(values[:1]), values[:-1]])
 
 
-def _partner(i: int, left: Int32, position: Float32, collision_m: float) -> int | None:
-    """The vehicle that collided with ``i``: the nearest with a collision left, first of those apart before.
-
-    ``left`` is the number of collisions without an event, shape (vehicle,); ``position`` (2, vehicle, 2) [m].
-    """
-    before, now = np.hypot(*np.moveaxis(position - position[:, i : i + 1], -1, 0))
-    others = np.flatnonzero((left > 0) & (np.arange(len(left)) != i)).tolist()
-    return min(others, key=lambda j: (before[j] < collision_m, now[j]), default=None)
-
-
-def losses(time_s: Float32, alive: Bool) -> list[Event]:
-    """An event for each vehicle at its first sample with ``alive`` (time, vehicle) False."""
-    gone, vehicles = np.nonzero(alive[:-1] & ~alive[1:])
-    return [Event(float(time_s[t + 1]), "lost", (i,)) for t, i in zip(gone.tolist(), vehicles.tolist(), strict=True)]
-
-
-def arrival(task_time_s: float | None) -> list[Event]:
-    """The event of the swarm's arrival, if it arrives."""
-    return [] if task_time_s is None else [Event(task_time_s, "arrived", ())]
+def _anew(time_s: Float32, below: Bool) -> Bool:
+    """Where near misses begin, from where vehicles are below their limit, shape (time, vehicle)."""
+    latest = np.maximum.accumulate(np.where(below, time_s[:, None], -np.inf), axis=0)
+    latest = np.vstack([np.full_like(latest[:1], -np.inf), latest[:-1]])
+    return below & (time_s[:, None] - latest > REARM_S)

@@ -13,13 +13,12 @@ from PIL import Image
 from uuv_marl.atomic import replacing, writing
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import CAMERAS
-from uuv_marl.envs.drawing.frame import Frame, Panel, pixels
+from uuv_marl.envs.drawing.frame import Panel, draw, pixels
 from uuv_marl.errors import ReplayError
 from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.replay import FILMS, MOST_EPISODES
 from uuv_marl.replay.recording import Recording
-from uuv_marl.replay.scenes import Scenes
 
 Picture = NDArray[np.uint8]
 _LENGTH_S, _HOLD_S = {".mp4": 20.0, ".gif": 10.0}, 2.0
@@ -62,28 +61,38 @@ def write_film(
         raise ReplayError(f"speed must be positive, got {speed}")
     if size is not None and not all(320 <= side <= 4096 and side % 2 == 0 for side in size):
         raise ReplayError(f"size must be width and height, even numbers of pixels from 320 to 4096, got {size}")
-    scenes = [Scenes(recording, sonar_of, trails=suffix != ".gif") for recording in recordings]
     longest = max(float(recording.time_s[-1]) for recording in recordings)
     size = size or _size(suffix, len(recordings))
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as partial:
+        shown = dict.fromkeys(
+            f"{one.scenario.name}, {one.scenario.swarm.num_vehicles} vehicles, seed {one.seed}" for one in recordings
+        )
+        heading = "; ".join(shown)
         if suffix == ".png":
-            Image.fromarray(_still(scenes, size, camera, longest)).save(partial, optimize=True)
+            moments = np.linspace(0.0, longest, _MOMENTS).tolist()
+            scenes = [(one, one.scene_at(now, sonar_of), now) for one in recordings for now in moments]
+            panels = [Panel(f"{one.policy} at {scene.time_s:.0f} s", scene, now) for one, scene, now in scenes]
+            still = pixels(draw(panels, size, camera, heading, columns=_MOMENTS))
+            Image.fromarray(still).save(partial, optimize=True)
             return
-        frame, (common, names) = Frame(size, len(scenes), grid=suffix != ".gif"), _names(scenes)
-        fps, speed = _FPS[suffix], speed or max(1.0, round(longest / _LENGTH_S[suffix]))
-        heading = f"{common}, {speed:.3g} times as fast" if speed != 1.0 else common
+        is_gif, fps, speed = suffix == ".gif", _FPS[suffix], speed or max(1.0, round(longest / _LENGTH_S[suffix]))
+        heading += f", {speed:.3g} times as fast" if speed != 1.0 else ""
         num = int(np.ceil(longest / speed * fps)) + 1
 
         def pictures() -> Iterator[Picture]:
             for k in range(num):
-                panels = [Panel(name, one.at(k * speed / fps)) for name, one in zip(names, scenes, strict=True)]
-                yield pixels(frame.draw(panels, camera, heading))
+                scenes = [one.scene_at(k * speed / fps, sonar_of) for one in recordings]
+                panels = [
+                    Panel(one.policy, scene._replace(trail=[]) if is_gif else scene)
+                    for one, scene in zip(recordings, scenes, strict=True)
+                ]
+                yield pixels(draw(panels, size, camera, heading, columns=len(panels), grid=not is_gif))
                 if progress:
                     progress((k + 1) / num)
 
-        (_write_mp4 if suffix == ".mp4" else _write_gif)(partial, pictures(), fps)
+        (_write_gif if is_gif else _write_mp4)(partial, pictures(), fps)
 
 
 def check_format(path: Path) -> str:
@@ -102,30 +111,6 @@ def _size(suffix: str, num: int) -> tuple[int, int]:
         return 1320, 450 * num
     across = ((560, 414, 276, 206) if suffix == ".gif" else (800, 640, 480, 400))[num - 1]
     return across * num, across + 140
-
-
-def _names(scenes: Sequence[Scenes]) -> tuple[str, list[str]]:
-    """Common part of the recordings' titles, and the differing part of each."""
-    rows = [
-        (str(one.policy), f"{one.scenario.name}, {one.scenario.swarm.num_vehicles} vehicles", f"seed {one.seed}")
-        for one in (scene.recording for scene in scenes)
-    ]
-    shared = [len(set(column)) == 1 for column in zip(*rows, strict=True)]
-    shared[0] = False
-    common = ", ".join(word for word, same in zip(rows[0], shared, strict=True) if same)
-    return common, [", ".join(word for word, same in zip(row, shared, strict=True) if not same) for row in rows]
-
-
-def _still(scenes: Sequence[Scenes], size: tuple[int, int], camera: str, longest: float) -> Picture:
-    """A row of moments for each recording, up to the end of the longest one."""
-    common, names = _names(scenes)
-    moments = np.linspace(0.0, longest, _MOMENTS).tolist()
-    panels = [
-        Panel(f"{name} at {one.at(now).time_s:.0f} s", one.at(now), now)
-        for name, one in zip(names, scenes, strict=True)
-        for now in moments
-    ]
-    return pixels(Frame(size, _MOMENTS).draw(panels, camera, common))
 
 
 def _write_gif(path: Path, pictures: Iterator[Picture], fps: int) -> None:

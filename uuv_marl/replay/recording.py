@@ -5,20 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.envs.drawing.scene import Scene, SonarView
+from uuv_marl.errors import ReplayError
+from uuv_marl.replay.events import Event
 from uuv_marl.scenario import Scenario
-from uuv_marl.tasks.groups import Groups
-from uuv_marl.types import Float32, Float64, Int32
-
-
-class Event(NamedTuple):
-    """An event of an episode, see ``uuv_marl.replay.events``."""
-
-    time_s: float
-    kind: str
-    """``collision`` of two vehicles, ``obstacle`` with an obstacle, ``near`` and ``near_obstacle`` where spacing
-    falls below s_u or clearance below s_o, ``lost``, or ``arrived`` for the swarm."""
-    vehicles: tuple[int, ...]
-    """Indices of the vehicles; empty for the swarm."""
+from uuv_marl.types import Float32, Int32
 
 
 class Inspection(NamedTuple):
@@ -40,15 +31,6 @@ class Inspection(NamedTuple):
     the end and once the vehicle is lost."""
 
 
-class Water(NamedTuple):
-    """Motion of the water: a uniform drift, and stationary eddies."""
-
-    drift: Float32
-    """Velocity of the mean current and the random process together, north and east [m/s], shape (time, 2)."""
-    eddies: Float64
-    """Centre north, east [m] and circulation [m2/s], clockwise positive, shape (eddy, 3)."""
-
-
 class Recording(NamedTuple):
     """One episode: the scenario, and all vehicles at each sample.
 
@@ -59,20 +41,10 @@ class Recording(NamedTuple):
     policy: str
     seed: int
     metrics: Metrics
-    waypoints: Float32
-    """Corners of the first group's trajectory, shape (point, 2)."""
-    groups: Groups
-    """Groups of vehicles with their paths, and informed vehicles."""
-    obstacles: Float32
-    """Centre north, east and radius, at the end, shape (obstacle, 3)."""
-    traffic: Float32 | None
-    """Centres of the obstacles at every sample, shape (time, obstacle, 2); None where none moves."""
-    marks: Float32
-    """Circles that the task draws: centre north, east and radius, 0 for none, shape (time, mark, 3)."""
+    scenes: list[Scene]
+    """What pictures show of each sample, except sonar."""
     time_s: Float32
     """Shape (time,)."""
-    references: Float32
-    """Position of each group's l(t), shape (time, group, 2)."""
     position: Float32
     """Shape (time, vehicle, 2)."""
     heading: Float32
@@ -87,13 +59,25 @@ class Recording(NamedTuple):
     """Length of the action since the sample before, as a share of full force, shape (time, vehicle); 0 at the start."""
     spacing: Float32
     """Smallest distance to another vehicle since the sample before [m], NaN for none, shape (time, vehicle)."""
-    clearance: Float32
-    """Smallest distance to an obstacle's surface since the sample before [m], infinite for none, as ``spacing``."""
     inspections: dict[int, Inspection]
     """Inspections by index of the vehicle."""
-    water: Water | None
-    """None in still water."""
 
-    def discs(self, k: int) -> Float32:
-        """The obstacles at a sample: centre north, east and radius, shape (obstacle, 3)."""
-        return self.obstacles if self.traffic is None else np.hstack([self.traffic[k], self.obstacles[:, 2:]])
+    def scene_at(self, time_s: float, sonar_of: int | None = None) -> Scene:
+        """The scene of the latest sample up to this time [s], optionally with the sonar of a vehicle.
+
+        Raises:
+            ReplayError: the recording has no sonar of that vehicle.
+        """
+        if sonar_of is not None and sonar_of not in self.inspections:
+            held = ", ".join(map(str, sorted(self.inspections))) or "none"
+            raise ReplayError(
+                f"the recording holds no sonar of vehicle {sonar_of}, only of: {held}; "
+                "name the vehicle when you record the episode"
+            )
+        k = max(int(np.searchsorted(self.time_s, time_s + 1e-6, side="right")) - 1, 0)
+        scene = self.scenes[k]
+        if sonar_of is None or not scene.alive[sonar_of]:
+            return scene
+        seen = self.inspections[sonar_of]
+        neighbour = seen.neighbour[k][seen.detected_index[k] >= 0]
+        return scene._replace(sonar=SonarView(sonar_of, neighbour, seen.echo_range[k]))

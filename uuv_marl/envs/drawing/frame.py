@@ -29,70 +29,56 @@ class Panel(NamedTuple):
     """Panels with the same clock share a view."""
 
 
-class Frame:
-    """Draws panels into a picture of this size [px], in so many columns."""
+def draw(
+    panels: Sequence[Panel], size: tuple[int, int], camera: str, heading: str = "", *,
+    columns: int = 1, grid: bool = True,
+) -> pygame.Surface:  # fmt: skip
+    """A picture of this size [px]: panels by row, below a heading if there is one, above the legend if it is small."""
+    unit = max(1.0, min(size[0] / columns, size[1]) / 800.0)
+    small, header = round(12 * unit), round(94 * unit)
+    above, below = (
+        round(24 * unit) if heading else 0,
+        round(20 * unit) * legend_rows(size[0], panels[0].scene, small) + 4,
+    )
+    has_legend = below < 0.15 * size[1]
+    wide, high = size[0] // columns, (size[1] - above - below * has_legend) // -(-len(panels) // columns)
+    painter = Painter((wide - (2 if columns > 1 else 0), high - header), grid=grid)
+    small_map = Painter((header - _PAD, header - _PAD))
+    surface = pygame.Surface(size, depth=32)
+    surface.fill(ink.WHITE)
+    ink.write(surface, heading, (_PAD, 5 * unit), round(13 * unit), ink.QUIET)
+    clocks = {panel.clock: [other.scene for other in panels if other.clock == panel.clock] for panel in panels}
+    views = {clock: aim(camera, scenes, painter.size) for clock, scenes in clocks.items()}
+    for k, (title, scene, clock) in enumerate(panels):
+        row, column = divmod(k, columns)
+        x, y, width = column * wide, above + row * high, wide - _PAD
+        surface.blit(painter.paint(scene, views[clock]), (x, y + header))
+        if camera == "follow":
+            width -= header
+            glimpse = small_map.glimpse(scene, aim("map", [scene], small_map.size), views[clock])
+            surface.blit(glimpse, (x + width + _PAD, y + _PAD // 2))
+        _head(surface, title, scene, (x + _PAD, y), width, unit, round((17 if wide >= 480 else 14) * unit))
+    if has_legend:
+        draw_legend(surface, pygame.Rect(0, size[1] - below, size[0], below), panels[0].scene, small)
+    return surface
 
-    def __init__(self, size: tuple[int, int], columns: int = 1, *, grid: bool = True) -> None:
-        self.size, self._columns, self._grid = size, columns, grid
-        self._surface = pygame.Surface(size, depth=32)
-        self._unit = max(1.0, min(size[0] / columns, size[1]) / 800.0)
-        self._text = round(12 * self._unit)
-        self._laid: tuple[int, ...] = ()
 
-    def draw(self, panels: Sequence[Panel], camera: str, heading: str = "") -> pygame.Surface:
-        """The picture, panels by row, below the heading if there is one; the next call overwrites it."""
-        self._lay_out(panels, heading)
-        self._surface.fill(ink.WHITE)
-        ink.write(self._surface, heading, (_PAD, 5 * self._unit), round(13 * self._unit), ink.QUIET)
-        clocks = {panel.clock: [other.scene for other in panels if other.clock == panel.clock] for panel in panels}
-        views = {clock: aim(camera, scenes, self._painter.size) for clock, scenes in clocks.items()}
-        wide, high = self._cell
-        for k, panel in enumerate(panels):
-            row, column = divmod(k, self._columns)
-            x, y, panel_width = column * wide, self._above + row * high, wide
-            self._surface.blit(self._painter.paint(panel.scene, views[panel.clock]), (x, y + self._header))
-            if camera == "follow":
-                panel_width -= self._header
-                glimpse = self._glimpse.glimpse(
-                    panel.scene, aim("map", [panel.scene], self._glimpse.size), views[panel.clock]
-                )
-                self._surface.blit(glimpse, (x + panel_width, y + _PAD // 2))
-            self._head(panel, (x + _PAD, y), panel_width - _PAD)
-        if self._below:
-            area = pygame.Rect(0, self.size[1] - self._below, self.size[0], self._below)
-            draw_legend(self._surface, area, panels[0].scene, self._text)
-        return self._surface
-
-    def _lay_out(self, panels: Sequence[Panel], heading: str) -> None:
-        """Cells for the panels, space for the heading above, and for the legend below if it is small."""
-        below = round(20 * self._unit) * legend_rows(self.size[0], panels[0].scene, self._text) + 4
-        laid = len(panels), below, len(heading) > 0
-        if self._laid == laid:
-            return
-        self._laid = laid
-        self._above = round(24 * self._unit) if heading else 0
-        self._below = below if below < 0.15 * self.size[1] else 0
-        high = (self.size[1] - self._above - self._below) // -(-len(panels) // self._columns)
-        self._cell = (self.size[0] // self._columns, high)
-        self._title, self._header = round((17 if self._cell[0] >= 480 else 14) * self._unit), round(94 * self._unit)
-        self._glimpse = Painter((self._header - _PAD, self._header - _PAD))
-        self._painter = Painter((self._cell[0] - (2 if self._columns > 1 else 0), high - self._header), grid=self._grid)
-
-    def _head(self, panel: Panel, at: tuple[int, int], width: int) -> None:
-        """The title, and the numbers in two rows."""
-        x, y = at
-        title = ink.fitting(panel.title, width, self._title, bold=True)
-        ink.write(self._surface, title, (x, y + 4 * self._unit), self._title, bold=True)
-        roomy = width > 480 * self._unit
-        if roomy:
-            after = x + ink.text(title, self._title, bold=True).get_width() + self._text
-            ink.write(self._surface, panel.scene.scenario.title, (after, y + 8 * self._unit), self._text, ink.QUIET)
-        for k, (label, short, value, colour) in enumerate(_numbers(panel.scene)):
-            row, column = divmod(k, 3)
-            left, top = x + column * min(width // 3, 190 * self._unit), y + (28 + 32 * row) * self._unit
-            ink.write(self._surface, label if roomy else short, (left, top), round(11 * self._unit), ink.QUIET)
-            high = round((13 if roomy else 12) * self._unit)
-            ink.write(self._surface, value, (left, top + 12 * self._unit), high, colour, bold=True)
+def _head(
+    surface: pygame.Surface, title: str, scene: Scene, at: tuple[int, int], width: int, unit: float, height: int
+) -> None:
+    """The title with letters of this height, and the numbers in two rows."""
+    x, y = at
+    title, small = ink.fitting(title, width, height, bold=True), round(12 * unit)
+    ink.write(surface, title, (x, y + 4 * unit), height, bold=True)
+    roomy = width > 480 * unit
+    if roomy:
+        after = x + ink.text(title, height, bold=True).get_width() + small
+        ink.write(surface, scene.scenario.title, (after, y + 8 * unit), small, ink.QUIET)
+    for k, (label, short, value, colour) in enumerate(_numbers(scene)):
+        row, column = divmod(k, 3)
+        left, top = x + column * min(width // 3, 190 * unit), y + (28 + 32 * row) * unit
+        ink.write(surface, label if roomy else short, (left, top), round(11 * unit), ink.QUIET)
+        ink.write(surface, value, (left, top + 12 * unit), round((13 if roomy else 12) * unit), colour, bold=True)
 
 
 def pixels(surface: pygame.Surface) -> NDArray[np.uint8]:

@@ -33,7 +33,7 @@ def signs_of(scene: Scene) -> list[tuple[str, Sign]]:
     signs.append((task.reference_label, moving if scene.followed_paths else _goal))
     if len(scene.marks):
         signs.append((task.mark_label or "of the task", _circle(ink.AMBER, width=1.0)))
-    if scene.trail.size:
+    if scene.trail:
         signs.append((f"last {TRAIL_S:g} s", _trail))
     near = f"nearer than {limits.s_u_m:g} m"
     if scene.obstacles.size:

@@ -122,7 +122,7 @@ class Painter:
             star(self._fine, view.pixels(path[-1]), radius, ink.TEAMS.get(team, ink.AMBER))
 
     def _trails(self, scene: Scene, view: Camera) -> None:
-        places = view.pixels(np.concatenate([scene.trail, scene.position[None]])[:, scene.alive])
+        places = view.pixels(np.array([*scene.trail, scene.position])[:, scene.alive])
         for k, part in enumerate(np.array_split(np.arange(len(places) - 1), len(ink.TRAILS))):
             lines = places[part[0] : part[-1] + 2].swapaxes(0, 1).tolist() if part.size else []
             for line, team in zip(lines, scene.groups.team[scene.alive], strict=False):

@@ -1,14 +1,15 @@
 """A scene: the content of a picture of one world at one moment, live or recorded."""
 
 from collections import deque
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.disturbances.current import FlowField
+from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks.groups import Groups, groups_of
 from uuv_marl.types import Bool
 
@@ -50,8 +51,8 @@ class Scene(NamedTuple):
     """False for lost vehicles, shape (vehicle,)."""
     near: Bool
     """Nearer than s_u to another vehicle, or than s_o to an obstacle, shape (vehicle,)."""
-    trail: Float
-    """Past positions, the oldest first, shape (sample, vehicle, 2)."""
+    trail: Sequence[Float]
+    """Past positions, the oldest first, shape (vehicle, 2) each."""
     hits: Float
     """Collisions so far: north, east and time [s], shape (hit, 3)."""
     arrival_s: float | None
@@ -80,63 +81,66 @@ class Scene(NamedTuple):
 
 
 class SceneHistory:
-    """Trails and collisions of every world, from the steps that were noted."""
+    """Trails and collisions of every world of a swarm, from the steps that were noted."""
 
-    def __init__(self, batch: BatchedEnv) -> None:
-        swarm = batch.swarm
-        period = swarm.scenario.timing.decision_period_s
+    def __init__(self, swarm: Swarm) -> None:
+        self._swarm, period, worlds = swarm, swarm.scenario.timing.decision_period_s, range(swarm.num_worlds)
         self._every = max(1, round(1.0 / period))
-        self._trail: deque[Float] = deque(maxlen=max(1, round(TRAIL_S / (self._every * period))))
-        self._hits: list[list[tuple[float, float, float]]] = [[] for _ in range(swarm.num_worlds)]
-        self._keys, self._time_s, self._steps = swarm.keys.copy(), np.full(swarm.num_worlds, -1.0), 0
+        most = max(1, round(TRAIL_S / (self._every * period)))
+        self._trails: list[deque[Float]] = [deque(maxlen=most) for _ in worlds]
+        self._hits: list[list[tuple[float, float, float]]] = [[] for _ in worlds]
+        self._collisions = np.zeros(len(worlds), np.int64)
+        self._keys, self._time_s, self._steps = swarm.keys.copy(), np.full(len(worlds), -1.0), 0
 
-    def note(self, batch: BatchedEnv) -> None:
+    def note(self) -> None:
         """Record the worlds after a reset or a step; a second call at the same moment changes nothing."""
-        swarm, facts = batch.swarm, batch.swarm.facts
+        swarm, facts = self._swarm, self._swarm.facts
         if np.array_equal(facts.time_s, self._time_s) and np.array_equal(swarm.keys, self._keys):
             return
         for w in np.flatnonzero((swarm.keys != self._keys) | (facts.time_s < self._time_s)):
             self._hits[w].clear()
-            for sample in self._trail:
-                sample[w] = np.nan
-        for w, i in np.argwhere((facts.vehicle_collisions > 0) & (facts.time_s > self._time_s)[:, None]):
+            self._trails[w].clear()
+            self._collisions[w] = 0
+        stepped = facts.time_s > self._time_s
+        self._collisions += facts.collisions * stepped
+        for w, i in np.argwhere((facts.vehicle_collisions > 0) & stepped[:, None]):
             self._hits[w].append((*swarm.state.eta[w, i, :2], facts.time_s[w]))
         if self._steps % self._every == 0:
-            self._trail.append(swarm.state.eta[:, :, :2].astype(np.float32))
+            for trail, eta in zip(self._trails, swarm.state.eta, strict=True):
+                trail.append(eta[:, :2].astype(np.float32))
         self._steps += 1
         self._keys, self._time_s = swarm.keys.copy(), facts.time_s.copy()
 
-    def scene(self, batch: BatchedEnv, world: int, sonar_of: int | None) -> Scene:
+    def scene(self, sonar_of: int | None = None, world: int = 0) -> Scene:
         """The present scene of a world, with the sonar of one vehicle unless it is lost."""
-        swarm, w = batch.swarm, world
+        swarm, w = self._swarm, world
         world_map, state, facts, constraints = swarm.world_map, swarm.state, swarm.facts, swarm.scenario.constraints
-        alive, position = state.alive[w].copy(), state.eta[w, :, :2].copy()
-        arrival_s = float(facts.arrival_s[w, 0])
+        alive, arrival_s = state.alive[w].copy(), float(facts.arrival_s[w, 0])
         return Scene(
             scenario=swarm.scenario,
             waypoints=world_map.waypoints[w, 0, : world_map.last[w, 0] + 1].copy(),
             obstacles=world_map.obstacles[w, : world_map.num_obstacles[w]].copy(),
             groups=groups_of(swarm, w),
-            marks=batch.task.marks(w),
+            marks=np.array(swarm.task.marks(w)),
             time_s=float(facts.time_s[w]),
             references=facts.reference[w, :, :2].copy(),
-            position=position,
+            position=state.eta[w, :, :2].copy(),
             heading=state.eta[w, :, 2].copy(),
             alive=alive,
             near=alive & ((facts.spacing[w] < constraints.s_u_m) | (facts.clearance[w] < constraints.s_o_m)),
-            trail=np.reshape([s[w] for s in self._trail if np.isfinite(s[w, 0, 0])], (-1, *position.shape)),
+            trail=list(self._trails[w]),
             hits=np.array(self._hits[w]).reshape(-1, 3),
-            arrival_s=arrival_s if np.isfinite(arrival_s) and batch.task.has_goal else None,
-            collisions=int(batch.collisions[w]),
+            arrival_s=arrival_s if np.isfinite(arrival_s) and swarm.task.has_goal else None,
+            collisions=int(self._collisions[w]),
             min_spacing_m=float(facts.min_spacing[w]),
             clearance_m=float(facts.obstacle_clearance[w].min()),
             centre_error_m=float(np.hypot(*(facts.centre[w] - swarm.mean_reference[w, :2]))),
-            sonar=None if sonar_of is None or not alive[sonar_of] else _sonar(batch, world, sonar_of),
+            sonar=None if sonar_of is None or not alive[sonar_of] else _sonar(swarm, world, sonar_of),
             water=swarm.flow_field(w) if swarm.scenario.current.flows else None,
         )
 
 
-def _sonar(batch: BatchedEnv, world: int, vehicle: int) -> SonarView:
-    percept, at = batch.swarm.percept, (world, vehicle)
+def _sonar(swarm: Swarm, world: int, vehicle: int) -> SonarView:
+    percept, at = swarm.percept, (world, vehicle)
     neighbour = percept["neighbour"][at][percept["detected"][at] > 0]
     return SonarView(vehicle, neighbour, percept["echo_range"][at].copy())

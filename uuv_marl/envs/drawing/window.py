@@ -8,7 +8,7 @@ from weakref import WeakSet
 
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import CAMERAS
-from uuv_marl.envs.drawing.frame import Frame, Panel
+from uuv_marl.envs.drawing.frame import Panel, draw
 from uuv_marl.envs.drawing.options import Look
 from uuv_marl.envs.drawing.scene import Scene
 from uuv_marl.extras import extra
@@ -40,7 +40,6 @@ class Window:
 
     def __init__(self, scenario: Scenario, look: Look, fps: int) -> None:
         self._shown: pygame.Surface | None = _open(look.size, scenario.name)
-        self._frame = Frame((look.size[0], look.size[1] - _KEYS_PX))
         self._name, self._vehicles = scenario.name, scenario.swarm.num_vehicles
         self._camera, self._sonar_of = look.camera, look.sonar_of
         self._fps, self._speed, self._clock = fps, 1.0, pygame.time.Clock()
@@ -95,8 +94,8 @@ class Window:
         return True
 
     def _draw(self, shown: pygame.Surface, scene: Scene) -> None:
-        shown.blit(self._frame.draw([Panel(self._name, scene)], self._camera), (0, 0))
         width, height = shown.get_size()
+        shown.blit(draw([Panel(self._name, scene)], (width, height - _KEYS_PX), self._camera), (0, 0))
         shown.fill(ink.TEXT, (0, height - _KEYS_PX, width, _KEYS_PX))
         inspected = "no vehicle" if self._sonar_of is None else f"vehicle {self._sonar_of}"
         keys = (
