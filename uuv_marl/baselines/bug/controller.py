@@ -12,7 +12,7 @@ import numpy as np
 from uuv_marl.baselines.bug.directions import RAYS, TURNS, choose_directions
 from uuv_marl.baselines.bug.gains import BUG_BARRIER, BugGains
 from uuv_marl.baselines.bug.walls import Walls, WallsMemory, update_walls, wall_planes
-from uuv_marl.baselines.memory import Surroundings
+from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.baselines.safety.barrier import Steering, neighbour_planes, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered
 from uuv_marl.baselines.scout.controller import pushed
@@ -37,7 +37,7 @@ class TangentBug(Filtered):
         """Update the memory and choose directions."""
         super().remember(percept, worlds)
         walls = Walls(*self.own)
-        update_walls(self.flat(percept), self.layout.offsets, worlds, self.model.sectors, self.surroundings, walls)
+        update_walls(self.flat(percept), self.layout.offsets, worlds, self.sectors, self.surroundings, walls)
         looks, free = np.empty_like(TURNS), np.empty(RAYS)
         choose_directions(worlds, self.float_gains, TURNS, looks, free, self.surroundings, walls)
 

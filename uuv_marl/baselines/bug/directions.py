@@ -10,7 +10,7 @@ import numpy as np
 
 from uuv_marl.baselines.bug.gains import BugGains
 from uuv_marl.baselines.bug.walls import Walls
-from uuv_marl.baselines.memory import Surroundings
+from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.types import Bool, Float64

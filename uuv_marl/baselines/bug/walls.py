@@ -6,10 +6,9 @@
 import math
 from typing import Annotated, NamedTuple
 
-from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import ActiveSectors, centre_of, surface_point
 from uuv_marl.baselines.memory.pose import to_map
-from uuv_marl.baselines.memory.table import with_surroundings
+from uuv_marl.baselines.memory.table import Surroundings, with_surroundings
 from uuv_marl.baselines.safety.barrier import MOST_CLOSED, Steering
 from uuv_marl.baselines.steering import full_speed
 from uuv_marl.percept import Starts

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.baselines.memory import Surroundings
+from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.baselines.safety.barrier import Steering, planes_of, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered
 from uuv_marl.baselines.scout.controller import modulated, pushed

@@ -11,10 +11,10 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar
 
-from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import noise_of
 from uuv_marl.baselines.memory.pose import to_body_axes, to_map_axes
+from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer

@@ -5,8 +5,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from uuv_marl.baselines.controller import Controller
-from uuv_marl.baselines.memory import OwnModel, Surroundings, update_memory
+from uuv_marl.baselines.memory.discs import ActiveSectors
 from uuv_marl.baselines.memory.neighbours import MEMORY_S
+from uuv_marl.baselines.memory.pose import DeadReckoning
+from uuv_marl.baselines.memory.surroundings import update_memory
+from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.baselines.safety.barrier import Barrier, Steering, with_numbers
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -42,8 +45,7 @@ class Filtered(Controller):
     ) -> None:  # fmt: skip
         usual, safe = with_numbers(self.tuned_numbers(tuned_for), self.Gains(), self.usual_barrier)
         super().__init__(scenario, num_worlds, gains=gains or usual)
-        self.model = OwnModel.of(scenario)
-        """Model of the vehicle's motion and sonar."""
+        self.model, self.sectors = DeadReckoning.of(scenario), ActiveSectors.of(scenario)
         split, most = len(Surroundings._fields), max(array.shape[2] for array in self.memory if array.ndim == 4)
         self.surroundings, self.own = Surroundings(*self.memory[:split]), self.memory[split:]
         """Arrays of ``memory``: those of all such policies, and the policy's own."""
@@ -59,4 +61,5 @@ class Filtered(Controller):
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Update the memory from the percept."""
         memory_s = float(getattr(self.gains, "memory_s", MEMORY_S))
-        update_memory(self.flat(percept), self.layout.offsets, worlds, self.model, memory_s, self.surroundings)
+        flat, at = self.flat(percept), self.layout.offsets
+        update_memory(flat, at, worlds, self.model, self.sectors, memory_s, self.surroundings)

@@ -7,8 +7,8 @@ Otherwise actions stay as they are, bit for bit.
 With a rudder the action is the desired force; its torque is close to the rudder's at cruise speed.
 """
 
-from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.pose import DeadReckoning, reckoned, to_map_axes
+from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.baselines.policy import Policy
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier, Steering, keeps, planes_of, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered
@@ -32,7 +32,7 @@ class Guarded(Filtered):
     def decide(self, percept: Percept) -> Float32:
         """Actions of the inner policy, shape (world, vehicle, 2), changed where they are not safe."""
         action = self.decide_part("inner", percept)
-        guard_all(self.active, self.model.own, self.safe, self.surroundings, action)
+        guard_all(self.active, self.model, self.safe, self.surroundings, action)
         self.clamps[...] = self.parts["inner"].clamps
         return action
 

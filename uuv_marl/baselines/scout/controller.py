@@ -6,11 +6,11 @@ remembered obstacles and made safe; the vehicle then steers to it.
 
 import math
 
-from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import middle
 from uuv_marl.baselines.memory.surroundings import uncertainty
+from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.baselines.policy import Limits, PolicyError
 from uuv_marl.baselines.safety.barrier import Barrier, Steering, margin, planes_of, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered

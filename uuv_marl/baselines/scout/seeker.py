@@ -9,9 +9,8 @@ import dataclasses
 import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.pose import to_map, to_map_axes
-from uuv_marl.baselines.memory.table import with_surroundings
+from uuv_marl.baselines.memory.table import Surroundings, with_surroundings
 from uuv_marl.baselines.policy import PolicyError
 from uuv_marl.baselines.requirements import with_parameters
 from uuv_marl.baselines.safety.barrier import Barrier, Steering, planes_of, steer_safely
