@@ -1,6 +1,7 @@
 """``Controller``: base class of hand-made policies with gains."""
 
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -12,23 +13,34 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.types import Float32
 
 
+class NoGains(NamedTuple):
+    """Table of a policy without gains."""
+
+
 class Controller(Policy):
-    """A policy with ``gains``, by default the tuned ones. A subclass fills an array of actions in ``_write``."""
+    """A policy with ``gains``, by default those tuned for a task. A subclass fills an array of actions in ``_write``.
+
+    ``tuned_for`` is the task, such as ``two_swarms`` where gains were tuned for it, or "" for the usual gains.
+    """
 
     requirements = PolicyRequirements(yaw_damping_nms=600.0, outputs_force=True)
-    Gains: ClassVar[type[Any]]
+    Gains: ClassVar[type[Any]] = NoGains
     """Table of the gains."""
     tuned_as: ClassVar[str] = ""
     """Name of the tuned gains; empty for the table's defaults."""
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, gains: Any = None) -> None:
+    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: Any = None) -> None:
         super().__init__(scenario, num_worlds)
-        self.gains = gains or self.Gains(**(tuned(self.tuned_as) if self.tuned_as else {}))
+        self.gains = gains or self.Gains(**self.tuned_numbers(tuned_for))
         self._centres, self._gain = scenario.sonar.echo_reports == "centre", velocity_gain(scenario)
+
+    def tuned_numbers(self, tuned_for: str) -> Mapping[str, float]:
+        """Tuned numbers by name; none if nothing was tuned. Raises PolicyError if none were tuned for this task."""
+        return tuned(self.tuned_as, tuned_for) if self.tuned_as or tuned_for else {}
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of shape (world, vehicle, 2)."""
-        action: Float32 = np.empty((*percept.flat.shape[:2], 2), np.float32)
+        action: Float32 = np.zeros((*percept.flat.shape[:2], 2), np.float32)
         self._write(percept, action)
         return action
 

@@ -36,8 +36,3 @@ def parse_name(name: str) -> PolicyName:
         if value not in ("true", "false"):
             raise PolicyError(f"policy {name!r}: {key} must be true or false, got {value!r}")
     return PolicyName(plain, values, *(value == "true" for value in options.values()))
-
-
-def with_option(name: str, option: str) -> str:
-    """A policy's name with an option switched on."""
-    return f"{name},{option}=true"

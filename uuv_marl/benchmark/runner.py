@@ -7,7 +7,7 @@ from pathlib import Path
 
 from uuv_marl.atomic import write_text, writing
 from uuv_marl.baselines import with_policy_requirements
-from uuv_marl.baselines.names import OWN_CLOCK, with_option
+from uuv_marl.baselines.names import OWN_CLOCK
 from uuv_marl.baselines.registry import is_trained
 from uuv_marl.benchmark.evaluate import blaming, episodes
 from uuv_marl.benchmark.figures import draw_all
@@ -25,7 +25,7 @@ def default_policies(scenarios: Sequence[Scenario]) -> list[str]:
     fixed = all(scenario.timing.fixed for scenario in scenarios)
     return [
         *DEFAULT_POLICIES,
-        *(with_option(name, OWN_CLOCK) for name in DEFAULT_POLICIES if fixed and not is_trained(name)),
+        *(f"{name},{OWN_CLOCK}=true" for name in DEFAULT_POLICIES if fixed and not is_trained(name)),
     ]
 
 

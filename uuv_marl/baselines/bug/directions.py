@@ -10,18 +10,15 @@ import numpy as np
 
 from uuv_marl.baselines.bug.gains import BugGains
 from uuv_marl.baselines.bug.walls import Walls
-from uuv_marl.baselines.memory import Surroundings
+from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.types import Bool, Float64
 
 RAYS = 120  # number of candidate directions, the first to the goal, then clockwise
+TURNS: Float64 = np.array([cos_sin(2.0 * math.pi * k / RAYS) for k in range(RAYS)])
+"""Unit vectors of the directions relative to the goal's, shape (ray, 2)."""
 _FREE_M = 1e6  # free distance where no echo is known [m]
-
-
-def rays() -> Float64:
-    """Unit vectors of the directions relative to the goal's, shape (ray, 2)."""
-    return np.array([cos_sin(2.0 * math.pi * k / RAYS) for k in range(RAYS)])
 
 
 @compiled
@@ -85,11 +82,7 @@ def chosen_ray(w: int, i: int, away: float, g: BugGains, walls: Walls, looks: Fl
 def choose_directions(
     worlds: Bool, g: BugGains, turns: Float64, looks: Float64, free: Float64, memory: Surroundings, walls: Walls
 ) -> None:
-    """Choose every vehicle's direction.
-
-    ``turns`` are unit vectors relative to the goal's direction, shape (ray, 2); ``looks`` (ray, 2) and ``free`` (ray,)
-    are work arrays of ``look_round``.
-    """
+    """Choose every vehicle's direction; ``turns`` are ``TURNS``, ``looks`` and ``free`` work arrays."""
     for w in range(worlds.shape[0]):
         for i in range(walls.num.shape[1] if worlds[w] else 0):
             x = memory.reference[w, i, 0] - memory.pose[w, i, 0]

@@ -6,12 +6,10 @@
 import math
 from typing import Annotated, NamedTuple
 
-from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import ActiveSectors, centre_of, surface_point
 from uuv_marl.baselines.memory.pose import to_map
-from uuv_marl.baselines.memory.table import with_surroundings
-from uuv_marl.baselines.policy import Limits
-from uuv_marl.baselines.safety.barrier import MOST_CLOSED, Barrier
+from uuv_marl.baselines.memory.table import Surroundings, with_surroundings
+from uuv_marl.baselines.safety.barrier import MOST_CLOSED, Steering
 from uuv_marl.baselines.steering import full_speed
 from uuv_marl.percept import Starts
 from uuv_marl.sim.compiled import compiled
@@ -74,16 +72,14 @@ def _put(w: int, i: int, x: float, y: float, radius: float, walls: Walls) -> Non
 
 
 @compiled
-def wall_planes(
-    w: int, i: int, period: float, barrier: Barrier, limits: Limits, memory: Surroundings, walls: Walls, planes: Float64
-) -> int:
+def wall_planes(w: int, i: int, safe: Steering, memory: Surroundings, walls: Walls) -> int:
     """Write the half-planes n . v <= b of near walls in the vehicle's map; returns their number."""
-    pose, rate, num = memory.pose[w, i], min(barrier.obstacle_rate, MOST_CLOSED / period), 0
-    fastest = full_speed(limits)
+    pose, planes, num = memory.pose[w, i], safe.planes, 0
+    rate, fastest = min(safe.barrier.obstacle_rate, MOST_CLOSED / safe.period), full_speed(safe.limits)
     for k in range(int(walls.num[w, i])):
         n_x, n_y = walls.echoes[w, i, k, 0] - pose[0], walls.echoes[w, i, k, 1] - pose[1]
         away = max(math.hypot(n_x, n_y), 1e-6)
-        bound = rate * (away - walls.echoes[w, i, k, 2] - barrier.obstacle_m)
+        bound = rate * (away - walls.echoes[w, i, k, 2] - safe.barrier.obstacle_m)
         if bound < fastest:
             planes[num, 0], planes[num, 1], planes[num, 2] = n_x / away, n_y / away, bound
             num += 1

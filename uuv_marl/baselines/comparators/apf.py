@@ -13,9 +13,8 @@ from typing import NamedTuple
 from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.controller import Controller
 from uuv_marl.baselines.paper.bio_inspired import MIN_DISTANCE_M, counts_once
-from uuv_marl.baselines.policy import Limits, tuned, write_action
+from uuv_marl.baselines.policy import Limits, write_action
 from uuv_marl.percept import Percept, Starts
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Int64
@@ -37,10 +36,8 @@ class Apf(Controller):
     ``tuned_for`` is ``two_swarms``, or "" for the paper's scenarios; ``gains`` replace the tuned ones.
     """
 
-    def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: ApfGains | None = None
-    ) -> None:
-        super().__init__(scenario, num_worlds, gains=gains or ApfGains(**tuned("apf", tuned_for)))
+    Gains = ApfGains
+    tuned_as = "apf"
 
     def _write(self, percept: Percept, action: Float32) -> None:
         _act(self.flat(percept), self.layout.offsets, self.gains, self.limits, self._centres, action, self.clamps)

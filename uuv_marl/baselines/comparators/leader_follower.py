@@ -12,15 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uuv_marl.baselines.memory import Surroundings
-from uuv_marl.baselines.policy import Limits, tuned
-from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
+from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.baselines.safety.barrier import Steering, planes_of, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered
 from uuv_marl.baselines.scout.controller import modulated, pushed
 from uuv_marl.percept import Percept
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
-from uuv_marl.types import Bool, Float32, Float64
+from uuv_marl.types import Bool, Float32
 
 
 class LeaderFollowerGains(NamedTuple):
@@ -48,23 +46,12 @@ _BACK = -0.3  # largest speed back of a leader that is too far ahead, as a share
 class LeaderFollower(Filtered):
     """Informed vehicles lead and wait; the others follow their neighbours, from remembered positions alone."""
 
-    def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, gains: LeaderFollowerGains | None = None,
-        barrier: Barrier | None = None,
-    ) -> None:  # fmt: skip
-        own_gains, own_barrier = with_numbers(tuned("leader_follower"), LeaderFollowerGains(), Barrier())
-        super().__init__(scenario, num_worlds, barrier or own_barrier)
-        self.gains = gains or own_gains
+    Gains = LeaderFollowerGains
+    tuned_as = "leader_follower"
 
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        action = np.zeros((self.num_worlds, self.scenario.swarm.num_vehicles, 2), np.float32)
+    def _write(self, percept: Percept, action: Float32) -> None:
         leads = percept["informed"] if "informed" in percept.names else np.ones_like(action[..., :1])
-        _act(
-            leads, self.active, self.model.own.period_s, LeaderFollowerGains(*map(float, self.gains)), self.barrier,
-            self.limits, self.gain, self.memory, self.planes, action,
-        )  # fmt: skip
-        return action
+        _act(leads, self.active, self.float_gains, self.safe, self.surroundings, action)
 
 
 Others = tuple[float, float, float, float]
@@ -115,9 +102,8 @@ def _leading(w: int, i: int, others: Others, g: LeaderFollowerGains, memory: Sur
 
 @compiled
 def _act(
-    leads: Float32, worlds: Bool, period: float, g: LeaderFollowerGains, barrier: Barrier, limits: Limits, gain: float,
-    memory: Surroundings, planes: Float64, action: Float32,
-) -> None:  # fmt: skip
+    leads: Float32, worlds: Bool, g: LeaderFollowerGains, safe: Steering, memory: Surroundings, action: Float32
+) -> None:
     """Write every vehicle's action. ``leads`` has shape (world, vehicle, 1)."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
@@ -125,6 +111,6 @@ def _act(
                 others = remembered(w, i, g, memory)
                 desired = _leading(w, i, others, g, memory) if leads[w, i, 0] > 0.0 else _following(others, g)
                 w_x, w_y = pushed(desired[0], desired[1], w, i, g.push, g.push_range, memory)
-                w_x, w_y = modulated(w_x, w_y, w, i, barrier, memory)
-                num = planes_of(w, i, period, barrier, memory, planes)
-                steer_safely(w, i, w_x, w_y, num, planes, gain, limits, memory, action)
+                w_x, w_y = modulated(w_x, w_y, w, i, safe.barrier, memory)
+                num = planes_of(w, i, safe, memory)
+                steer_safely(w, i, w_x, w_y, num, safe, memory, action)

@@ -14,12 +14,11 @@ import numpy as np
 from uuv_marl.baselines.avoidance import obstacle_at
 from uuv_marl.baselines.controller import Controller
 from uuv_marl.baselines.paper.bio_inspired import counts_once
-from uuv_marl.baselines.policy import Limits, tuned
+from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer
 from uuv_marl.percept import Fields, Percept, Starts
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
 from uuv_marl.types import Float32, Float64
@@ -44,16 +43,13 @@ class OrcaInformed(Controller):
     """
 
     requirements = PolicyRequirements(("link",), yaw_damping_nms=600.0, outputs_force=True)
-
-    def __init__(
-        self, scenario: Scenario, num_worlds: int = 1, *, tuned_for: str = "", gains: OrcaGains | None = None
-    ) -> None:
-        super().__init__(scenario, num_worlds, gains=gains or OrcaGains(**tuned("orca_informed", tuned_for)))
-        self._planes: Float64 = np.zeros((scenario.sonar.num_sectors + scenario.sonar.num_active_sectors, 3))
+    Gains = OrcaGains
+    tuned_as = "orca_informed"
 
     def _write(self, percept: Percept, action: Float32) -> None:
-        flat, period = self.flat(percept), self.scenario.timing.decision_period_s
-        _act(flat, self.at, self.gains, self.limits, self._gain, period, self._centres, self._planes, action)
+        flat, period, sonar = self.flat(percept), self.scenario.timing.decision_period_s, self.scenario.sonar
+        planes = np.zeros((sonar.num_sectors + sonar.num_active_sectors, 3))
+        _act(flat, self.at, self.gains, self.limits, self._gain, period, self._centres, planes, action)
 
 
 @compiled

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from uuv_marl.atomic import writing
 from uuv_marl.baselines import make_policy, with_policy_requirements
@@ -20,7 +19,6 @@ from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.observation import observation_layout
-from uuv_marl.types import Int64
 
 with extra("onnx", "export to ONNX"):
     import onnx
@@ -106,7 +104,9 @@ class Graph:
         self.nodes: list[onnx.NodeProto] = []
         self.constants: list[onnx.TensorProto] = []
         self._named = 0
-        self.tanh, self.sigmoid, self.relu = (functools.partial(self, name) for name in ("Tanh", "Sigmoid", "Relu"))
+        operators = ("Tanh", "Sigmoid", "Relu", "Gemm")
+        self.tanh, self.sigmoid, self.relu, self.dense = (functools.partial(self, name) for name in operators)
+        self.take = functools.partial(self, "Gather", axis=1)
 
     def __call__(self, operator: str, *inputs: Any, name: str = "", **attributes: Any) -> "Value":
         """The output of a new node with an operator's inputs (values, or arrays as constants), name and attributes."""
@@ -114,14 +114,6 @@ class Graph:
         values = [each if isinstance(each, Value) else self.constant(each) for each in inputs]
         self.nodes.append(helper.make_node(operator, [value.name for value in values], [name], name, **attributes))
         return Value(self, name)
-
-    def dense(self, x: "Value", *weight_and_bias: NDArray[Any]) -> "Value":
-        """A layer without its activation."""
-        return self("Gemm", x, *weight_and_bias)
-
-    def take(self, x: "Value", columns: Int64) -> "Value":
-        """Some columns."""
-        return self("Gather", x, columns, axis=1)
 
     def shaped(self, x: "Value", shape: Sequence[int]) -> "Value":
         """The tensor in another shape; -1 for an axis that follows from the others."""

@@ -41,15 +41,9 @@ def identify(w: int, i: int, axis: int, asked: float, off: float, period: float,
     f, g, h = at[ACTED] - at[ACTED_BEFORE], asked - at[ASKED], at[ASKED] - at[ASKED_BEFORE]
     y = off - (at[ACTED] - at[ASKED])
     share = max(1.0 - period / _FORGETTING_S, 0.0)
-    at[SQUARES] = share * at[SQUARES] + f * f
-    at[SQUARES + 1] = share * at[SQUARES + 1] + f * g
-    at[SQUARES + 2] = share * at[SQUARES + 2] + f * h
-    at[SQUARES + 3] = share * at[SQUARES + 3] + g * g
-    at[SQUARES + 4] = share * at[SQUARES + 4] + g * h
-    at[SQUARES + 5] = share * at[SQUARES + 5] + h * h
-    at[PRODUCTS] = share * at[PRODUCTS] + f * y
-    at[PRODUCTS + 1] = share * at[PRODUCTS + 1] + g * y
-    at[PRODUCTS + 2] = share * at[PRODUCTS + 2] + h * y
+    products = (f * f, f * g, f * h, g * g, g * h, h * h, f * y, g * y, h * y)
+    for k in range(len(products)):
+        at[SQUARES + k] = share * at[SQUARES + k] + products[k]
     at[ACTED_BEFORE], at[ASKED_BEFORE] = at[ACTED], at[ASKED]
     at[ACTED], at[ASKED] = asked + off, asked
 

@@ -1,7 +1,6 @@
 """Update of a vehicle's memory from a percept: position, obstacles, neighbours; and its uncertainty."""
 
 import math
-from typing import NamedTuple
 
 from uuv_marl.baselines.memory import discs, neighbours, pose
 from uuv_marl.baselines.memory.discs import ActiveSectors
@@ -9,7 +8,6 @@ from uuv_marl.baselines.memory.pose import DeadReckoning
 from uuv_marl.baselines.memory.response import remains
 from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.percept import Starts
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.views import fields
 from uuv_marl.types import Bool, Float32
@@ -23,45 +21,25 @@ USUAL_AGE_S, OLD_S = 0.15, 0.2
 means are below 0.12 s, from remembered neighbours; the second number is assumed."""
 
 
-class OwnModel(NamedTuple):
-    """A vehicle's model of its motion and sonar."""
-
-    own: DeadReckoning
-    sectors: ActiveSectors
-
-    @staticmethod
-    def of(scenario: Scenario) -> "OwnModel":
-        """Model of a scenario's vehicle."""
-        return OwnModel(DeadReckoning.of(scenario), ActiveSectors.of(scenario))
-
-
-@compiled
-def is_lost_percept(row: Float32) -> bool:
-    """Whether a percept, shape (entry,), is a lost vehicle's: all zero."""
-    for k in range(row.shape[0]):  # noqa: SIM110 - compiled
-        if row[k] != 0.0:
-            return False
-    return True
-
-
 @compiled
 def update_memory(
-    flat: Float32, at: Starts, worlds: Bool, model: OwnModel, memory_s: float, memory: Surroundings
-) -> None:
+    flat: Float32, at: Starts, worlds: Bool, own: DeadReckoning, sectors: ActiveSectors, memory_s: float,
+    memory: Surroundings,
+) -> None:  # fmt: skip
     """Update every vehicle's memory from its percept. Call it once for every decision."""
     see = fields(flat, at)
     for w in range(flat.shape[0]):
         for i in range(flat.shape[1] if worlds[w] else 0):
-            if is_lost_percept(flat[w, i]):
+            if not flat[w, i].any():  # a lost vehicle's
                 memory.begun[w, i] = 0.0
                 continue
             if memory.begun[w, i] == 0.0:
                 pose.begin_map(w, i, see, memory)
             else:
-                pose.move(w, i, see, model.own, memory)
+                pose.move(w, i, see, own, memory)
             pose.store_motion(w, i, see, memory)
-            discs.update_discs(w, i, see, model.sectors, memory)
-            neighbours.update_neighbours(w, i, see, model.own.period_s, memory_s, memory)
+            discs.update_discs(w, i, see, sectors, memory)
+            neighbours.update_neighbours(w, i, see, own.period_s, memory_s, memory)
             _store_distances(w, i, memory)
 
 

@@ -11,10 +11,10 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar
 
-from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import noise_of
 from uuv_marl.baselines.memory.pose import to_body_axes, to_map_axes
+from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.safety.halfplanes import nearest_velocity
 from uuv_marl.baselines.steering import full_speed, steer
@@ -40,6 +40,16 @@ class Barrier(NamedTuple):
     noise_margin: float = 3.0  # factor of the neighbours' mean position error, added to that distance [1]
     share: float = 0.6  # share of a change that each of two neighbours makes [1]; half would do with full information
     horizon_m: float = 60.0  # neighbours and surfaces farther away are ignored [m]
+
+
+class Steering(NamedTuple):
+    """What the filter needs beside a vehicle's memory."""
+
+    barrier: Barrier
+    limits: Limits
+    period: float  # decision period [s]
+    gain: float  # force per velocity error [N s/m]
+    planes: Float64  # work array for half-planes
 
 
 MOST_CLOSED = 0.3  # largest share of the remaining distance that is closed in a decision period [1]
@@ -72,11 +82,11 @@ def margin(w: int, i: int, d: int, barrier: Barrier, memory: Surroundings) -> fl
 
 
 @compiled
-def planes_of(w: int, i: int, period: float, barrier: Barrier, memory: Surroundings, planes: Float64) -> int:
+def planes_of(w: int, i: int, safe: Steering, memory: Surroundings) -> int:
     """Write the half-planes n . v <= b of remembered obstacles and neighbours in the map; returns their number."""
-    pose, num = memory.pose[w, i], 0
-    x, y = pose[0], pose[1]
-    rate = min(barrier.obstacle_rate, MOST_CLOSED / period)
+    barrier, planes, num = safe.barrier, safe.planes, 0
+    x, y = memory.pose[w, i, 0], memory.pose[w, i, 1]
+    rate = min(barrier.obstacle_rate, MOST_CLOSED / safe.period)
     for d in range(memory.score.shape[2]):
         if memory.score[w, i, d] < CONFIRMED:
             continue
@@ -87,17 +97,16 @@ def planes_of(w: int, i: int, period: float, barrier: Barrier, memory: Surroundi
             planes[num, 0], planes[num, 1] = n_x / away, n_y / away
             planes[num, 2] = rate * (left - margin(w, i, d, barrier, memory))
             num += 1
-    return neighbour_planes(w, i, num, period, barrier, memory, planes)
+    return neighbour_planes(w, i, num, safe, memory)
 
 
 @compiled
-def neighbour_planes(
-    w: int, i: int, num: int, period: float, barrier: Barrier, memory: Surroundings, planes: Float64
-) -> int:
+def neighbour_planes(w: int, i: int, num: int, safe: Steering, memory: Surroundings) -> int:
     """Write the half-planes of neighbours after the first ``num``; returns the number of planes."""
+    barrier, planes = safe.barrier, safe.planes
     x, y = memory.pose[w, i, 0], memory.pose[w, i, 1]
     v_x, v_y = to_map_axes(memory.motion[w, i, 0], memory.motion[w, i, 1], memory.pose[w, i])
-    rate = min(barrier.neighbour_rate, MOST_CLOSED / period)
+    rate = min(barrier.neighbour_rate, MOST_CLOSED / safe.period)
     for k in range(memory.known.shape[2]):
         away = max(memory.away[w, i, k], 1e-6)
         if away < barrier.horizon_m:
@@ -122,10 +131,9 @@ def keeps(v_x: float, v_y: float, planes: Float64, num: int) -> bool:
 
 @compiled
 def steer_safely(
-    w: int, i: int, w_x: float, w_y: float, num: int, planes: Float64, gain: float, limits: Limits,
-    memory: Surroundings, action: Float32,
-) -> None:  # fmt: skip
+    w: int, i: int, w_x: float, w_y: float, num: int, safe: Steering, memory: Surroundings, action: Float32
+) -> None:
     """Write the action for the velocity nearest to a desired one that satisfies the half-planes."""
-    safe_x, safe_y, _ = nearest_velocity(w_x, w_y, planes, num, 0, full_speed(limits))
-    w_x, w_y = to_body_axes(safe_x, safe_y, memory.pose[w, i])
-    steer(w_x, w_y, memory.motion[w, i, 0], memory.motion[w, i, 1], gain, limits, action[w, i])
+    w_x, w_y, _ = nearest_velocity(w_x, w_y, safe.planes, num, 0, full_speed(safe.limits))
+    w_x, w_y = to_body_axes(w_x, w_y, memory.pose[w, i])
+    steer(w_x, w_y, memory.motion[w, i, 0], memory.motion[w, i, 1], safe.gain, safe.limits, action[w, i])

@@ -7,17 +7,17 @@ Otherwise actions stay as they are, bit for bit.
 With a rudder the action is the desired force; its torque is close to the rudder's at cruise speed.
 """
 
-from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.pose import DeadReckoning, reckoned, to_map_axes
-from uuv_marl.baselines.policy import Limits, Policy
-from uuv_marl.baselines.safety.barrier import GUARD, Barrier, keeps, planes_of, steer_safely
+from uuv_marl.baselines.memory.table import Surroundings
+from uuv_marl.baselines.policy import Policy
+from uuv_marl.baselines.safety.barrier import GUARD, Barrier, Steering, keeps, planes_of, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered
 from uuv_marl.baselines.steering import steady_velocity
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.types import Bool, Float32, Float64
+from uuv_marl.types import Bool, Float32
 
 
 class Guarded(Filtered):
@@ -27,12 +27,12 @@ class Guarded(Filtered):
         self.parts = {"inner": inner}
         self.name = inner.name
         self.requirements = inner.requirements
-        super().__init__(scenario, num_worlds, barrier)
+        super().__init__(scenario, num_worlds, barrier=barrier)
 
     def decide(self, percept: Percept) -> Float32:
         """Actions of the inner policy, shape (world, vehicle, 2), changed where they are not safe."""
         action = self.decide_part("inner", percept)
-        guard_all(self.active, self.model.own, self.barrier, self.limits, self.gain, self.memory, self.planes, action)
+        guard_all(self.active, self.model, self.safe, self.surroundings, action)
         self.clamps[...] = self.parts["inner"].clamps
         return action
 
@@ -46,18 +46,15 @@ def coming_velocity(w: int, i: int, action: Float32, own: DeadReckoning, memory:
 
 
 @compiled
-def guard_all(
-    worlds: Bool, own: DeadReckoning, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings,
-    planes: Float64, action: Float32,
-) -> None:  # fmt: skip
+def guard_all(worlds: Bool, own: DeadReckoning, safe: Steering, memory: Surroundings, action: Float32) -> None:
     """Replace unsafe actions in place."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if not worlds[w] or memory.begun[w, i] == 0.0:
                 continue
-            num = planes_of(w, i, own.period_s, barrier, memory, planes)
+            num = planes_of(w, i, safe, memory)
             v_x, v_y = coming_velocity(w, i, action[w, i], own, memory)
-            if not keeps(v_x, v_y, planes, num):
-                a_x, a_y = steady_velocity(action[w, i, 0], action[w, i, 1], limits)
+            if not keeps(v_x, v_y, safe.planes, num):
+                a_x, a_y = steady_velocity(action[w, i, 0], action[w, i, 1], safe.limits)
                 w_x, w_y = to_map_axes(a_x, a_y, memory.pose[w, i])
-                steer_safely(w, i, w_x, w_y, num, planes, gain, limits, memory, action)
+                steer_safely(w, i, w_x, w_y, num, safe, memory, action)

@@ -6,15 +6,13 @@ remembered obstacles and made safe; the vehicle then steers to it.
 
 import math
 
-import numpy as np
-
-from uuv_marl.baselines.memory import Surroundings
 from uuv_marl.baselines.memory.actuators import lead
 from uuv_marl.baselines.memory.discs import CONFIRMED
 from uuv_marl.baselines.memory.neighbours import middle
 from uuv_marl.baselines.memory.surroundings import uncertainty
+from uuv_marl.baselines.memory.table import Surroundings
 from uuv_marl.baselines.policy import Limits, PolicyError
-from uuv_marl.baselines.safety.barrier import Barrier, margin, planes_of, steer_safely
+from uuv_marl.baselines.safety.barrier import Barrier, Steering, margin, planes_of, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS, ScoutGains
 from uuv_marl.percept import Percept
@@ -22,7 +20,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.sections import growth
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.vehicle import project
-from uuv_marl.types import Bool, Float32, Float64
+from uuv_marl.types import Bool, Float32
 
 
 class Scout(Filtered):
@@ -31,6 +29,8 @@ class Scout(Filtered):
     ``preset`` is a name of ``PRESETS``, else PolicyError is raised; ``gains`` and ``barrier`` replace the preset's.
     """
 
+    Gains = ScoutGains
+
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, preset: str = DEFAULT_PRESET, gains: ScoutGains | None = None,
         barrier: Barrier | None = None,
@@ -38,26 +38,17 @@ class Scout(Filtered):
         if preset not in PRESETS:
             raise PolicyError(f"preset of scout must be one of {', '.join(PRESETS)}, got {preset!r}")
         numbers = PRESETS[preset]
-        super().__init__(scenario, num_worlds, barrier or numbers.barrier)
-        self.gains = gains or numbers.gains
+        super().__init__(scenario, num_worlds, gains=gains or numbers.gains, barrier=barrier or numbers.barrier)
         self._growth = growth(scenario.swarm.num_vehicles)
 
-    def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - it is in the memory
-        """Actions of shape (world, vehicle, 2)."""
-        action = np.zeros((self.num_worlds, self.scenario.swarm.num_vehicles, 2), np.float32)
-        decide_all(
-            self.active, self.model.own.period_s, self._scaled_gains(), self.barrier, self.limits, self.gain,
-            self.memory, self.planes, action,
-        )  # fmt: skip
-        return action
-
-    def _scaled_gains(self) -> ScoutGains:
-        """The gains for the swarm's size, all float: other types would compile the kernels again."""
-        gains, g = ScoutGains(*map(float, self.gains)), self._growth
-        return gains._replace(
+    def _write(self, percept: Percept, action: Float32) -> None:  # noqa: ARG002 - it is in the memory
+        gains, g = self.float_gains, self._growth
+        gains = gains._replace(
             pull=gains.pull / g, pull_at_rest=gains.pull_at_rest * math.sqrt(g), push_at_rest=gains.push_at_rest * g,
             together=gains.together / g**3,
         )  # fmt: skip
+        safe = self.safe._replace(gain=self._gain * gains.steering)
+        decide_all(self.active, gains, safe, self.surroundings, action)
 
 
 @compiled
@@ -127,17 +118,14 @@ def _lead(w: int, i: int, share: float, limits: Limits, memory: Surroundings, ac
 
 
 @compiled
-def decide_all(
-    worlds: Bool, period: float, g: ScoutGains, barrier: Barrier, limits: Limits, gain: float, memory: Surroundings,
-    planes: Float64, action: Float32,
-) -> None:  # fmt: skip
+def decide_all(worlds: Bool, g: ScoutGains, safe: Steering, memory: Surroundings, action: Float32) -> None:
     """Write every vehicle's action."""
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and memory.begun[w, i] > 0.0:
                 w_x, w_y = desired_velocity(w, i, g, memory)
-                w_x, w_y = modulated(w_x, w_y, w, i, barrier, memory)
-                num = planes_of(w, i, period, barrier, memory, planes)
-                steer_safely(w, i, w_x, w_y, num, planes, gain * g.steering, limits, memory, action)
-                if g.lead > 0.0 and limits.helm == 0.0:
-                    _lead(w, i, g.lead, limits, memory, action)
+                w_x, w_y = modulated(w_x, w_y, w, i, safe.barrier, memory)
+                num = planes_of(w, i, safe, memory)
+                steer_safely(w, i, w_x, w_y, num, safe, memory, action)
+                if g.lead > 0.0 and safe.limits.helm == 0.0:
+                    _lead(w, i, g.lead, safe.limits, memory, action)

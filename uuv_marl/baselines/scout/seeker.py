@@ -9,14 +9,11 @@ import dataclasses
 import math
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-import numpy as np
-
-from uuv_marl.baselines.memory import Surroundings, update_memory
 from uuv_marl.baselines.memory.pose import to_map, to_map_axes
-from uuv_marl.baselines.memory.table import with_surroundings
-from uuv_marl.baselines.policy import Limits, PolicyError, tuned
+from uuv_marl.baselines.memory.table import Surroundings, with_surroundings
+from uuv_marl.baselines.policy import PolicyError
 from uuv_marl.baselines.requirements import with_parameters
-from uuv_marl.baselines.safety.barrier import Barrier, planes_of, steer_safely, with_numbers
+from uuv_marl.baselines.safety.barrier import Barrier, Steering, planes_of, steer_safely
 from uuv_marl.baselines.safety.filtered import Filtered
 from uuv_marl.baselines.scout.controller import pushed
 from uuv_marl.percept import Fields, Percept, Starts
@@ -66,16 +63,16 @@ class NearestTarget(Filtered):
     """
 
     Memory: ClassVar[type[Any] | None] = SeekerMemory
+    Gains = SeekerGains
+    tuned_as = "nearest_target"
     requirements = Filtered.requirements._replace(channels_if={"lanes": ["identity"]})
 
     def __init__(
         self, scenario: Scenario, num_worlds: int = 1, *, lanes: bool = False, gains: SeekerGains | None = None,
         barrier: Barrier | None = None,
     ) -> None:  # fmt: skip
-        tuned_gains, safe = with_numbers(tuned("nearest_target", "lanes" if lanes else ""), SeekerGains(), Barrier())
         self.requirements = with_parameters(self.requirements, ["lanes"] * lanes)
-        super().__init__(scenario, num_worlds, barrier or safe)
-        self.gains = gains or tuned_gains
+        super().__init__(scenario, num_worlds, tuned_for="lanes" if lanes else "", gains=gains, barrier=barrier)
         if "box" not in self.layout.starts:
             raise PolicyError(
                 f"nearest_target searches a box, which task {scenario.task.name!r} does not have; run it on "
@@ -83,29 +80,25 @@ class NearestTarget(Filtered):
             )
         self._half_m = 0.5 * scenario.task_numbers.side_m
         self._lanes = scenario.swarm.num_vehicles if lanes else 0
-        split = len(Surroundings._fields)
-        self._surroundings, self._track = Surroundings(*self.memory[:split]), TrackedTarget(*self.memory[split:])
+        self._track = TrackedTarget(*self.own)
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Update tracks from the echoes, and the surroundings without echoes, since targets are not obstacles."""
-        seen, period = dataclasses.replace(percept, flat=percept.flat.copy()), self.model.own.period_s
+        seen = dataclasses.replace(percept, flat=percept.flat.copy())
         for name in ("echo", "echo_range", "echo_position"):
             seen[name][:] = 0.0
-        update_memory(self.flat(seen), self.layout.offsets, worlds, self.model, self.memory_s, self._surroundings)
+        super().remember(seen, worlds)
         update_tracks(
-            self.flat(percept), self.layout.offsets, worlds, percept["box"], period, self._half_m, self._lanes,
-            SeekerGains(*map(float, self.gains)), self._surroundings, self._track,
+            self.flat(percept), self.layout.offsets, worlds, percept["box"], self.safe.period, self._half_m,
+            self._lanes, self.float_gains, self.surroundings, self._track,
         )  # fmt: skip
 
-    def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        action, period = np.zeros((*self._track.track_timeout_s.shape, 2), np.float32), self.model.own.period_s
+    def _write(self, percept: Percept, action: Float32) -> None:
+        gains = self.float_gains
         seek(
-            self.flat(percept), self.layout.offsets, self.active, percept["box"], period, self._half_m, self._lanes,
-            SeekerGains(*map(float, self.gains)), self.barrier, self.limits, self.gain, self._surroundings, self._track,
-            self.planes, action,
+            self.flat(percept), self.layout.offsets, self.active, percept["box"], self._half_m, self._lanes, gains,
+            self.safe._replace(gain=self._gain * gains.steering), self.surroundings, self._track, action,
         )  # fmt: skip
-        return action
 
 
 @compiled
@@ -223,9 +216,8 @@ def _following(w: int, i: int, g: SeekerGains, memory: Surroundings, track: Trac
 
 @compiled
 def seek(
-    flat: Float32, at: Starts, worlds: Bool, box: Float32, period: float, half_m: float, lanes: int, g: SeekerGains,
-    barrier: Barrier, limits: Limits, gain: float, memory: Surroundings, track: TrackedTarget, planes: Float64,
-    action: Float32,
+    flat: Float32, at: Starts, worlds: Bool, box: Float32, half_m: float, lanes: int, g: SeekerGains, safe: Steering,
+    memory: Surroundings, track: TrackedTarget, action: Float32,
 ) -> None:  # fmt: skip
     """Write every vehicle's action."""
     see = fields(flat, at)
@@ -237,5 +229,5 @@ def seek(
                 else:
                     w_x, w_y = _searching(w, i, half_m, lanes, see, box, g.speed, memory, track)
                 w_x, w_y = pushed(w_x, w_y, w, i, g.push, g.push_range, memory)
-                num = planes_of(w, i, period, barrier, memory, planes)
-                steer_safely(w, i, w_x, w_y, num, planes, gain * g.steering, limits, memory, action)
+                num = planes_of(w, i, safe, memory)
+                steer_safely(w, i, w_x, w_y, num, safe, memory, action)
