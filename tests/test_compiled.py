@@ -96,7 +96,6 @@ def test_byte_code_without_sources_never_runs_old_physics(copy, tmp_path):
         for path in place.rglob("*.py"):
             path.unlink()
         done.append(run(place, tmp_path / "cache"))
-        assert "The sources of uuv_marl are not on this disk" in done[k].stderr
     assert done[0].stdout != done[1].stdout
     assert not list((tmp_path / "cache").rglob("*.nbi"))
 

@@ -85,8 +85,7 @@ class _Locator(caching._CacheLocator):
     def get_source_stamp(self) -> str:
         return cast(str, self._key)
 
-    def get_disambiguator(self) -> str:
-        return cast(str, self._key)
+    get_disambiguator = get_source_stamp
 
 
 class _Implementation(caching.CompileResultCacheImpl):
@@ -110,7 +109,8 @@ class _Cache(caching.FunctionCache):
         if overload is None:
             _announce(cast(Path, cache()))
         else:
-            _touch(index)
+            with contextlib.suppress(OSError):
+                os.utime(index)
         return overload
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -122,13 +122,6 @@ class _Cache(caching.FunctionCache):
         except OSError as error:
             _log.warning("%s can't be kept (%s), so the next start compiles again.", self.cache_path, error.strerror)
             self.disable()
-
-
-def _touch(index: Path) -> None:
-    """Update a file's time of use, once a day."""
-    with contextlib.suppress(OSError):
-        if time.time() - index.stat().st_mtime > 86400.0:
-            os.utime(index)
 
 
 def _announce(folder: Path) -> None:
@@ -151,15 +144,6 @@ def prune(folder: Path) -> None:
                 for path in index.parent.glob(f"{glob.escape(index.name.partition('.nbi')[0])}.*nb[ci]*"):
                     path.unlink(missing_ok=True)
                 index.parent.rmdir()
-
-
-@functools.cache
-def _warn_of_missing_sources(package: str) -> None:
-    _log.warning(
-        "The sources of %s are not on this disk, so compiled code is not kept, and every start compiles again, for up "
-        "to a minute; install the package with its .py files.",
-        package,
-    )
 
 
 def _key(function: Callable[..., Any]) -> str | None:
@@ -220,10 +204,6 @@ def entry(function: F, *arguments: object) -> F:
 
 def _jit(function: F, **options: object) -> F:
     dispatcher = cast(Any, numba).njit(**options, **_OPTIONS)(function)
-    if _settings.DISABLE_JIT or cache() is None:
-        return cast(F, dispatcher)
-    if _key(function) is None:
-        _warn_of_missing_sources(function.__module__.partition(".")[0])
-    else:
+    if not _settings.DISABLE_JIT and cache() is not None and _key(function) is not None:
         dispatcher._cache = _Cache(function)
     return cast(F, dispatcher)
