@@ -14,7 +14,7 @@ from tests.test_tasks import TWO
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy
 from uuv_marl.sim.disturbances.actuation import victims
-from uuv_marl.sim.disturbances.current import advance_gust, eddy_flow, flow_at
+from uuv_marl.sim.disturbances.current import advance_gust, eddy_flow
 from uuv_marl.sim.disturbances.disturbances import DISTURBANCE_CHANNELS, disturbance_tables
 from uuv_marl.sim.exponential import decay_mean, exp
 from uuv_marl.sim.random import normals
@@ -216,9 +216,11 @@ def test_eddies_alternate_so_that_their_circulation_sums_to_zero():
 
 def test_the_water_at_a_vehicle_is_the_field_there():
     swarm = swim(CURRENT | GUSTS | EDDIES, 25)
+    flow, core = swarm._disturbances.flow, swarm._disturbances.water.core
     for i in range(5):
         x, y, _ = swarm.state.eta[0, i]
-        assert tuple(swarm.flow[0, i]) == flow_at(0, x, y, swarm._disturbances.water.core, swarm._disturbances.flow)
+        parts = [eddy_flow(x - e_x, y - e_y, circulation, core) for e_x, e_y, circulation in flow.eddies[0]]
+        np.testing.assert_allclose(swarm.flow[0, i], flow.mean[0] + flow.gust[0] + np.sum(parts, axis=0), rtol=1e-12)
     np.testing.assert_array_equal(swarm.flow_field().at(swarm.state.eta[0, :, :2]), swarm.flow[0])
     assert not Swarm(load_scenario(STARTER)).flow_field().at([[[1.0, 2.0]]]).any()
     with pytest.raises(ValueError, match=r"north and east \[m\], shape \(..., 2\), got shape \(3,\)"):

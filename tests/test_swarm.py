@@ -13,7 +13,7 @@ from tests.processes import python
 from tests.swarms import fly, piloted, started
 from uuv_marl import load_scenario
 from uuv_marl.sim import engine as engine_module
-from uuv_marl.sim.field import sample_field
+from uuv_marl.sim.episode_setup import sample_field
 from uuv_marl.sim.threads import on_threads
 
 

@@ -11,7 +11,7 @@ from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import SeedLike, world_seeds
-from uuv_marl.sim.streams import packed, unpacked
+from uuv_marl.sim.random import packed, unpacked
 from uuv_marl.types import Bool, Float32
 
 

@@ -51,8 +51,8 @@ def swim(scenario: Scenario, action: tuple[float, float], seconds: float, speed_
     forces = (0.0, 0.0)
     for _ in range(round(seconds / h)):
         thrust, steer = actuators(*action, now[5], p)
-        u_0, u_1, u_2 = followed(thrust, forces[0], numbers.thrust_half, numbers.thrust_whole)
-        r_0, r_1, r_2 = followed(steer, forces[1], numbers.yaw_half, numbers.yaw_whole)
+        u_0, u_1, u_2 = followed(thrust, forces[0], numbers.thrust_lag)
+        r_0, r_1, r_2 = followed(steer, forces[1], numbers.yaw_lag)
         now = advance_lagging(now, (u_0, r_0), (u_1, r_1), (u_2, r_2), STILL, h, p)
         forces = u_2, r_2
         yield now

@@ -9,12 +9,10 @@ import functools
 import glob
 import logging
 import os
-import re
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 import platformdirs
@@ -30,34 +28,25 @@ _UNUSED_S = 30 * 86400.0
 """Compiled code unused for this time is deleted."""
 _QUIET_S = 60.0
 """Functions compiled within this time of each other share one message."""
-_FOLDER, _MARK = "uuv_marl-compiled", "compiled-by-uuv_marl.txt"
-_WHAT_THIS_IS = "uuv_marl keeps compiled code in this folder. Code that is not used for a month is deleted from it.\n"
-_OURS = re.compile(r".+-[0-9a-f]{16}\.py\d+\w*\.(nbi|\d+\.nbc)(\.tmp\.[0-9a-f]{16})?")
-"""File names in the cache: function, key, Python, number; also of an interrupted write."""
 _settings, caching = cast(Any, _config), cast(Any, _caching)
 _last_compiled = -_QUIET_S
 
 
-class Cache(NamedTuple):
-    """Folder of compiled code."""
-
-    folder: Path
-    writable: bool
-    """False where it was prepared by others, as in a container's image, or the disk is read-only."""
-
-
 @functools.cache
-def cache() -> Cache | None:
-    """The cache, in ``UUV_MARL_CACHE_DIR`` or the user's cache folder; None if it can't be used."""
+def cache() -> Path | None:
+    """Folder of compiled code, in ``UUV_MARL_CACHE_DIR`` or the user's cache folder; None if it can't be used.
+
+    It may be read-only where it was prepared by others, as in a container's image.
+    """
     folder: Path | str = "of the user"
     try:
-        folder = user_path(os.environ.get("UUV_MARL_CACHE_DIR") or platformdirs.user_cache_dir("uuv_marl")) / _FOLDER
+        folder = user_path(os.environ.get("UUV_MARL_CACHE_DIR") or platformdirs.user_cache_dir("uuv_marl"))
         if folder.parts[0].startswith("~"):
             raise OSError(0, "no home folder is known")
-        _claim(folder)
-        folder = folder / f"numba-{numba.__version__}"
-        _make(folder)
-        return Cache(folder, _can_write(folder))
+        for name in ("uuv_marl-compiled", f"numba-{numba.__version__}"):
+            folder = folder / name
+            _make(folder)
+        return folder
     except (OSError, RuntimeError) as error:  # RuntimeError: no home folder is known
         _log.warning(
             "The compile cache %s can't be used (%s), so every start compiles again, for up to a minute. "
@@ -79,25 +68,6 @@ def _make(folder: Path) -> None:
         raise OSError(0, "it belongs to another user, or others may write to it")
 
 
-def _claim(folder: Path) -> None:
-    """Make a folder of the package's own, marked by a file. Raises OSError if it holds other files."""
-    _make(folder)
-    mark = folder / _MARK
-    if mark.exists():
-        return
-    if any(folder.iterdir()):
-        raise OSError(0, f"it holds files that are not uuv_marl's: there is no {_MARK}")
-    mark.write_text(_WHAT_THIS_IS, encoding="utf-8")
-
-
-def _can_write(folder: Path) -> bool:
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            return True
-    except OSError:
-        return False
-
-
 class _Locator(caching._CacheLocator):
     """Numba's locator of a function's files, by the hash of its code."""
 
@@ -110,13 +80,12 @@ class _Locator(caching._CacheLocator):
         return cls(py_func, py_file)
 
     def get_cache_path(self) -> str:
-        return str(cast(Cache, cache()).folder)
+        return str(cache())
 
     def get_source_stamp(self) -> str:
         return cast(str, self._key)
 
-    def get_disambiguator(self) -> str:
-        return cast(str, self._key)
+    get_disambiguator = get_source_stamp
 
 
 class _Implementation(caching.CompileResultCacheImpl):
@@ -138,14 +107,15 @@ class _Cache(caching.FunctionCache):
             with contextlib.suppress(OSError):
                 index.unlink(missing_ok=True)
         if overload is None:
-            _announce(cast(Cache, cache()))
+            _announce(cast(Path, cache()))
         else:
-            _touch(index)
+            with contextlib.suppress(OSError):
+                os.utime(index)
         return overload
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save compiled code."""
-        if not cast(Cache, cache()).writable:
+        if not os.access(cast(Path, cache()), os.W_OK):
             return
         try:
             caching.FunctionCache.save_overload(self, sig, data)
@@ -154,44 +124,26 @@ class _Cache(caching.FunctionCache):
             self.disable()
 
 
-def _touch(index: Path) -> None:
-    """Update a file's time of use, once a day."""
-    with contextlib.suppress(OSError):
-        if time.time() - index.stat().st_mtime > 86400.0:
-            os.utime(index)
-
-
-def _announce(place: Cache) -> None:
+def _announce(folder: Path) -> None:
     """Log that compiling takes long, and delete unused code meanwhile."""
     global _last_compiled  # noqa: PLW0603 - a clock of this process
     if time.monotonic() - _last_compiled > _QUIET_S:
-        outcome = "is kept in %s" if place.writable else "can't be kept, since %s can't be written to"
-        _log.warning(f"Compiling a part of uuv_marl: this takes up to a minute, and {outcome}.", place.folder)
-        if place.writable:
-            prune(place.folder.parent)
+        writable = os.access(folder, os.W_OK)
+        outcome = "is kept in %s" if writable else "can't be kept, since %s can't be written to"
+        _log.warning(f"Compiling a part of uuv_marl: this takes up to a minute, and {outcome}.", folder)
+        if writable:
+            prune(folder.parent)
     _last_compiled = time.monotonic()
 
 
 def prune(folder: Path) -> None:
-    """Delete compiled code unused for a month, also of other versions of Numba, from a marked folder."""
-    if not (folder / _MARK).exists():
-        return
+    """Delete compiled code unused for a month, also of other versions of Numba."""
     for index in folder.glob("numba-*/*.nbi*"):
         with contextlib.suppress(OSError):  # another process may delete, too; folders that are not empty stay
-            if _OURS.fullmatch(index.name) and time.time() - index.stat().st_mtime > _UNUSED_S:
-                code = index.parent.glob(f"{glob.escape(index.name.partition('.nbi')[0])}.*.nbc*")
-                for path in (index, *(path for path in code if _OURS.fullmatch(path.name))):
+            if time.time() - index.stat().st_mtime > _UNUSED_S:
+                for path in index.parent.glob(f"{glob.escape(index.name.partition('.nbi')[0])}.*nb[ci]*"):
                     path.unlink(missing_ok=True)
                 index.parent.rmdir()
-
-
-@functools.cache
-def _warn_of_missing_sources(package: str) -> None:
-    _log.warning(
-        "The sources of %s are not on this disk, so compiled code is not kept, and every start compiles again, for up "
-        "to a minute; install the package with its .py files.",
-        package,
-    )
 
 
 def _key(function: Callable[..., Any]) -> str | None:
@@ -252,10 +204,6 @@ def entry(function: F, *arguments: object) -> F:
 
 def _jit(function: F, **options: object) -> F:
     dispatcher = cast(Any, numba).njit(**options, **_OPTIONS)(function)
-    if _settings.DISABLE_JIT or cache() is None:
-        return cast(F, dispatcher)
-    if _key(function) is None:
-        _warn_of_missing_sources(function.__module__.partition(".")[0])
-    else:
+    if not _settings.DISABLE_JIT and cache() is not None and _key(function) is not None:
         dispatcher._cache = _Cache(function)
     return cast(F, dispatcher)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from uuv_marl.sim.arrays import State
-from uuv_marl.sim.compiled import compiled, compiled_inner
+from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.vehicle import STILL, Plant, actuators, advance, effort, held, limited, wrap
 from uuv_marl.sim.workspace import Columns
@@ -13,16 +13,12 @@ from uuv_marl.types import Float32
 @compiled_inner
 def load_state(w: int, state: State, now: Columns) -> None:
     """Load the columns of world w from its state."""
-    eta, nu = state.eta, state.nu
-    for i in range(eta.shape[1]):
-        now.x[i], now.y[i], now.psi[i] = eta[w, i, 0], eta[w, i, 1], eta[w, i, 2]
-        now.u[i], now.v[i], now.r[i] = nu[w, i, 0], nu[w, i, 1], nu[w, i, 2]
-        now.psi_0[i] = eta[w, i, 2]
-    for i in range(eta.shape[1]):
-        now.cos[i], now.sin[i] = cos_sin(now.psi[i])
+    for i in range(state.eta.shape[1]):
+        load_one(w, i, state, now)
+        now.psi_0[i] = state.eta[w, i, 2]
 
 
-@compiled_inner
+@compiled_inline
 def load_one(w: int, i: int, state: State, now: Columns) -> None:
     """Load the columns of one vehicle, which discards its latest motion."""
     eta, nu = state.eta, state.nu

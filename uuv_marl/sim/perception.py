@@ -55,22 +55,32 @@ def toward(dx: float, dy: float, c: float, s: float) -> tuple[float, float]:
 
 
 @compiled_inline
+def body_velocity(v_x: float, v_y: float, c: float, s: float) -> tuple[float, float]:
+    """A velocity (north, east) in the body frame, ahead and to starboard [m/s]; at most ``MAX_SPEED`` each."""
+    return saturate(c * v_x + s * v_y, MAX_SPEED), saturate(c * v_y - s * v_x, MAX_SPEED)
+
+
+@compiled_inline
+def write_reference(w: int, i: int, pose: Pose, world: World, see: Fields) -> None:
+    """Write l(t) and its velocity, if vehicle i is informed, as it perceives them at a pose."""
+    if world.world_map.informed[w, i]:
+        (x, y, c, s), l_t = pose, world.facts.reference[w, world.world_map.group[w, i]]
+        see.reference[w, i, 0], see.reference[w, i, 1] = toward(l_t[0] - x, l_t[1] - y, c, s)
+        see.reference_velocity[w, i, 0], see.reference_velocity[w, i, 1] = body_velocity(l_t[2], l_t[3], c, s)
+
+
+@compiled_inline
 def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspace, see: Fields) -> None:
     """Write the percept of entry p's vehicle. Eq. 11, 14-17."""
     cells, listener, world_map = workspace.cells, workspace.listener, world.world_map
-    nu, reference, i = world.state.nu, world.facts.reference, cells.vehicle[p]
+    nu, i = world.state.nu, cells.vehicle[p]
     x, y, c, s = cells.x[p], cells.y[p], cells.cos[p], cells.sin[p]
     for k in range(world.senses.percept.shape[2]):
         world.senses.percept[w, i, k] = 0.0
     see.velocity[w, i, 0] = saturate(nu[w, i, 0], MAX_SPEED)
     see.velocity[w, i, 1] = saturate(nu[w, i, 1], MAX_SPEED)
     see.yaw_rate[w, i, 0] = saturate(nu[w, i, 2], MAX_SPEED)
-    if world_map.informed[w, i]:
-        l_t = reference[w, world_map.group[w, i]]
-        v_x, v_y = l_t[2], l_t[3]
-        see.reference[w, i, 0], see.reference[w, i, 1] = toward(l_t[0] - x, l_t[1] - y, c, s)
-        see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
-        see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+    write_reference(w, i, (x, y, c, s), world, see)
     for k in range(see.detected.shape[2]):
         j = listener.detected_index[k]
         see.detected[w, i, k] = 1.0 if j >= 0 else 0.0
@@ -79,8 +89,7 @@ def write_percept(p: int, w: int, world: World, model: Model, workspace: Workspa
             c_j, s_j = cells.cos[cells.entry[j]], cells.sin[cells.entry[j]]
             v_x, v_y = c_j * nu[w, j, 0] - s_j * nu[w, j, 1], s_j * nu[w, j, 0] + c_j * nu[w, j, 1]
             see.link_identity[w, i, k] = j + 1
-            see.link_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
-            see.link_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+            see.link_velocity[w, i, k, 0], see.link_velocity[w, i, k, 1] = body_velocity(v_x, v_y, c, s)
     if see.compass.shape[2] > 0:
         see.compass[w, i, 0], see.compass[w, i, 1] = c, s
     if see.identity.shape[2] > 0:

@@ -3,16 +3,19 @@
 So a disturbance never changes another's numbers, and batch size, threads and API don't matter. The generator is
 Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC11): the episode's key is its key, the
 four others are its counter. The logarithm is implemented here, since a C library's may differ in the last bit.
+
+Each world's NumPy generator, which samples its episodes, is stored in snapshots as an array.
 """
 
 import hashlib
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from uuv_marl.sim.compiled import compiled_inline
-from uuv_marl.sim.streams import packed
 from uuv_marl.sim.trigonometry import cos_sin
+from uuv_marl.types import UInt64
 
 Block = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
 
@@ -21,6 +24,8 @@ _LOW, _HALF = np.uint64(0xFFFFFFFF), np.uint64(32)
 _MULTIPLIER_0, _MULTIPLIER_1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
 _WEYL_0, _WEYL_1 = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
 _HIGH_SHIFT, _LOW_SHIFT, _HIGH_BITS = np.uint64(5), np.uint64(6), np.uint64(26)
+
+_WORD = 2**64 - 1
 
 _FRACTION, _ONE_HALF = np.int64((1 << 52) - 1), np.int64(1022 << 52)
 """Bits of a number's fraction, and those of 0.5."""
@@ -36,6 +41,34 @@ DRIFT, COMPASS = 30, 31
 MESSAGE = 40
 MOVER, MOVER_DIRECTION = 50, 51
 """Purposes of an episode's random numbers, one for each draw."""
+
+
+def packed(streams: Sequence[np.random.Generator | None]) -> UInt64:
+    """States of NumPy's default generators (PCG64), shape (stream, 6); zeros for None."""
+    rows = np.zeros((len(streams), 6), np.uint64)
+    for row, stream in zip(rows, streams, strict=True):
+        if stream is not None:
+            whole = stream.bit_generator.state
+            state, inc = whole["state"]["state"], whole["state"]["inc"]
+            row[:] = (state & _WORD, state >> 64, inc & _WORD, inc >> 64, whole["has_uint32"], whole["uinteger"])
+    return rows
+
+
+def unpacked(rows: UInt64, num: int) -> list[np.random.Generator | None]:
+    """``num`` generators that continue from ``packed`` states. Raises ValueError if the array doesn't fit."""
+    if rows.shape != (num, 6) or rows.dtype != np.uint64:
+        raise ValueError(f"streams must be uint64 of shape ({num}, 6), got {rows.dtype} of shape {rows.shape}")
+    streams: list[np.random.Generator | None] = []
+    for low, high, inc_low, inc_high, has_half, half in rows.tolist():
+        stream = np.random.default_rng(0)
+        stream.bit_generator.state = {
+            "bit_generator": "PCG64",
+            "state": {"state": low | high << 64, "inc": inc_low | inc_high << 64},
+            "has_uint32": has_half,
+            "uinteger": half,
+        }
+        streams.append(stream if inc_low else None)  # a PCG's increment is odd
+    return streams
 
 
 def episode_key(stream: np.random.Generator) -> np.uint64:

@@ -41,22 +41,20 @@ def stop_hulls(
             dy = state.eta[w, i, 1] - world_map.obstacles[w, k, 1]
             if dx * dx + dy * dy < near * near:
                 d, n_x, n_y = length_and_direction(dx, dy)
-                displace(w, i, n_x, n_y, max(near - d - SINK_M, 0.0), world)
                 speed, yields = along(w, i, n_x, n_y, world, plant, disturbances)
                 speed -= n_x * world_map.obstacle_velocity[w, k, 0] + n_y * world_map.obstacle_velocity[w, k, 1]
-                push(w, i, n_x, n_y, max(-speed, 0.0) / yields, world, plant, disturbances)
+                deep, impulse = max(near - d - SINK_M, 0.0), max(-speed, 0.0) / yields
+                push(w, i, n_x, n_y, deep, impulse, world, plant, disturbances)
         for j in range(i):
             dx, dy = state.eta[w, i, 0] - state.eta[w, j, 0], state.eta[w, i, 1] - state.eta[w, j, 1]
             if state.alive[w, j] and dx * dx + dy * dy < touch * touch:
                 d, n_x, n_y = length_and_direction(dx, dy)
                 half = 0.5 * max(touch - d - SINK_M, 0.0)
-                displace(w, i, n_x, n_y, half, world)
-                displace(w, j, -n_x, -n_y, half, world)
                 speed_i, yields_i = along(w, i, n_x, n_y, world, plant, disturbances)
                 speed_j, yields_j = along(w, j, n_x, n_y, world, plant, disturbances)
                 impulse = max(speed_j - speed_i, 0.0) / (yields_i + yields_j)
-                push(w, i, n_x, n_y, impulse, world, plant, disturbances)
-                push(w, j, -n_x, -n_y, impulse, world, plant, disturbances)
+                push(w, i, n_x, n_y, half, impulse, world, plant, disturbances)
+                push(w, j, -n_x, -n_y, half, impulse, world, plant, disturbances)
     for i in range(state.eta.shape[1]):
         load_one(w, i, state, workspace.now)
 
@@ -66,13 +64,6 @@ def length_and_direction(dx: float, dy: float) -> tuple[float, float, float]:
     """Length of a vector [m] and its direction, a unit vector; north for length 0."""
     d = math.sqrt(dx * dx + dy * dy)
     return (d, dx / d, dy / d) if d > 0.0 else (0.0, 1.0, 0.0)
-
-
-@compiled_inner
-def displace(w: int, i: int, n_x: float, n_y: float, distance: float, world: World) -> None:
-    """Move a vehicle by a distance [m] along the unit vector n."""
-    world.state.eta[w, i, 0] += distance * n_x
-    world.state.eta[w, i, 1] += distance * n_y
 
 
 @compiled_inner
@@ -91,10 +82,12 @@ def along(
 
 @compiled_inner
 def push(
-    w: int, i: int, n_x: float, n_y: float, impulse: float, world: World, plant: Plant,
+    w: int, i: int, n_x: float, n_y: float, distance: float, impulse: float, world: World, plant: Plant,
     disturbances: Disturbances | None,
 ) -> None:  # fmt: skip
-    """Apply an impulse [N s] along the unit vector n to a vehicle, by its own inertia (Eq. 2)."""
+    """Move a vehicle by a distance [m] along the unit vector n, and apply an impulse [N s], by its inertia (Eq. 2)."""
+    world.state.eta[w, i, 0] += distance * n_x
+    world.state.eta[w, i, 1] += distance * n_y
     if disturbances is not None:
         plant = own_plant(w, i, disturbances.hull)
     c, s = cos_sin(world.state.eta[w, i, 2])

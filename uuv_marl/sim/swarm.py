@@ -16,9 +16,8 @@ from uuv_marl.sim.disturbances.disturbances import disturbance_tables, make_dist
 from uuv_marl.sim.engine import Engine
 from uuv_marl.sim.episode_setup import EpisodeSetup
 from uuv_marl.sim.model import ARRIVAL_RADII_M
-from uuv_marl.sim.random import episode_key
+from uuv_marl.sim.random import episode_key, packed, unpacked
 from uuv_marl.sim.spacing import NOWHERE
-from uuv_marl.sim.streams import packed, unpacked
 from uuv_marl.sim.tables import allocate, check
 from uuv_marl.sim.traffic import sample_traffic
 from uuv_marl.types import Bool, Float64
@@ -98,12 +97,11 @@ class Swarm:
 
     def flow_field(self, world: int = 0) -> FlowField:
         """Present velocity field of a world's water, as in ``swarm.flow_field().at([[100.0, 200.0]])``."""
-        if self._disturbances is None:
-            return FlowField(np.zeros(2), np.zeros((0, 3)), self.scenario.current.eddy_core_m)
-        flow, eddies = self._disturbances.flow, self._disturbances.flow.eddies[world]
-        return FlowField(
-            flow.mean[world] + flow.gust[world], eddies[eddies[:, 2] != 0.0], self._disturbances.water.core
-        )
+        flow, core_m = self.currents, self.scenario.current.eddy_core_m
+        if flow is None:
+            return FlowField(np.zeros(2), np.zeros((0, 3)), core_m)
+        eddies = flow.eddies[world]
+        return FlowField(flow.mean[world] + flow.gust[world], eddies[eddies[:, 2] != 0.0], core_m)
 
     @property
     def velocity(self) -> Float64:

@@ -7,8 +7,7 @@ import numpy as np
 
 from uuv_marl.percept import FLAG, FieldTable, PerceptField
 from uuv_marl.scenario.fields import Positive, within
-from uuv_marl.sim.episode_setup import EpisodeSetup
-from uuv_marl.sim.start import start_state
+from uuv_marl.sim.episode_setup import EpisodeSetup, start_state
 from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.tasks.reach import Reach, ReachNumbers
 from uuv_marl.tasks.reward import Terms

@@ -9,8 +9,7 @@ from uuv_marl.percept import LENGTH, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario, ScenarioError
 from uuv_marl.scenario.fields import Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
-from uuv_marl.sim.episode_setup import EpisodeSetup
-from uuv_marl.sim.start import start_state
+from uuv_marl.sim.episode_setup import EpisodeSetup, start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin, rotated
 from uuv_marl.tasks.maps.grid_paths import CELL_M, MapGrid, distances, free_cells, reached

@@ -16,8 +16,7 @@ from uuv_marl.errors import RewardError, ScenarioError
 from uuv_marl.percept import CHANNELS, FLAG, FieldTable, PerceptField, percept_table
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import Section
-from uuv_marl.sim.episode_setup import EpisodeSetup, default_setup
-from uuv_marl.sim.field import longest_duration
+from uuv_marl.sim.episode_setup import EpisodeSetup, default_setup, longest_duration
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.tables import allocate
 from uuv_marl.tasks.measures import MEASURED

@@ -12,8 +12,7 @@ from uuv_marl.percept import FLAG, FieldTable, PerceptField
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.fields import NonNegative, Positive
 from uuv_marl.scenario.vehicle_checks import top_speed
-from uuv_marl.sim.episode_setup import EpisodeSetup
-from uuv_marl.sim.start import start_state
+from uuv_marl.sim.episode_setup import EpisodeSetup, start_state
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.tasks.maps.guidance import AHEAD_M, PATH_FIELDS, in_axes, path_terms

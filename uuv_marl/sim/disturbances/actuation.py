@@ -16,7 +16,7 @@ from uuv_marl.sim.model import Rules
 from uuv_marl.sim.random import MISMATCH, ONSET, VICTIM, uniform, uniforms
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
-from uuv_marl.sim.vehicle import Plant, advance_lagging, plant, wrap
+from uuv_marl.sim.vehicle import Plant, Vector2, advance_lagging, plant, wrap
 from uuv_marl.sim.workspace import Columns
 from uuv_marl.types import Bool, Float64, Int64
 
@@ -30,11 +30,10 @@ PLANT = len(Plant._fields)
 class Actuation(NamedTuple):
     """Constants of a scenario's lags, yaw authority and faults."""
 
-    # Share of the difference between commanded and actual thrust that remains after half an integration step
-    thrust_half: float
-    thrust_whole: float  # share that remains of it after a whole step; 0 without a lag
-    yaw_half: float  # the same for the torque, after half an integration step
-    yaw_whole: float  # the same for the torque, after a whole step
+    # Shares of the difference between commanded and actual thrust that remain after half an integration step and after
+    # a whole one; 0 without a lag
+    thrust_lag: Vector2
+    yaw_lag: Vector2  # the same for the torque
     yaw_authority: float  # share of the commanded torque that acts on the vehicle
     kind: Int64  # kind of each fault: ``THRUSTER``, ``YAW``, ``ARRAY`` or ``MEMBER``, shape (fault,)
     efficiency: Float64  # share of thrust or torque that remains under a fault, shape (fault,)
@@ -62,15 +61,14 @@ def actuation(scenario: Scenario) -> Actuation:
     """Constants of the scenario's lags, yaw authority and faults for the compiled functions."""
     actuators, names = scenario.actuators, [array.name for array in scenario.sonar.arrays]
 
-    def remains(seconds: float, lag_s: float) -> float:
-        return exp(-seconds / lag_s) if lag_s > 0.0 else 0.0
-
     h = scenario.timing.integration_step_s
+
+    def remain(lag_s: float) -> Vector2:
+        return (exp(-0.5 * h / lag_s), exp(-h / lag_s)) if lag_s > 0.0 else (0.0, 0.0)
+
     return Actuation(
-        thrust_half=remains(0.5 * h, actuators.thrust_lag_s),
-        thrust_whole=remains(h, actuators.thrust_lag_s),
-        yaw_half=remains(0.5 * h, actuators.yaw_lag_s),
-        yaw_whole=remains(h, actuators.yaw_lag_s),
+        thrust_lag=remain(actuators.thrust_lag_s),
+        yaw_lag=remain(actuators.yaw_lag_s),
         yaw_authority=actuators.yaw_authority,
         kind=np.array([_KINDS[fault.kind] for fault in scenario.faults], np.int64),
         efficiency=np.array([fault.efficiency for fault in scenario.faults], np.float64),
@@ -81,19 +79,16 @@ def actuation(scenario: Scenario) -> Actuation:
 def sample_hulls(w: int, key: np.uint64, duration_s: float, scenario: Scenario, hull: Hull) -> None:
     """Sample the vehicles of world w's new episode into ``hull``; faults begin within ``duration_s``."""
     hull.tau[w] = 0.0
-    mismatch, nominal = scenario.mismatch, plant(scenario)
-    hull.plants[w], hull.thrust[w] = nominal, 1.0
-    if max(mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust) > 0.0:
+    mismatch = scenario.mismatch
+    shares = np.array([mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust])
+    hull.plants[w], hull.thrust[w] = plant(scenario), 1.0
+    if shares.max() > 0.0:
         for i in range(scenario.swarm.num_vehicles):
-            mass, added = uniforms(key, MISMATCH, 0, i, 0)
-            drag, thrust = uniforms(key, MISMATCH, 0, i, 1)
-            own = scenario.vehicle.times(
-                1.0 + mismatch.mass * (2.0 * mass - 1.0),
-                1.0 + mismatch.added_mass * (2.0 * added - 1.0),
-                1.0 + mismatch.drag * (2.0 * drag - 1.0),
-            )
+            drawn = np.array([*uniforms(key, MISMATCH, 0, i, 0), *uniforms(key, MISMATCH, 0, i, 1)])
+            mass, added_mass, drag, thrust = (1.0 + shares * (2.0 * drawn - 1.0)).tolist()
+            own = scenario.vehicle.times(mass, added_mass, drag)
             hull.plants[w, i] = plant(scenario.model_copy(update={"vehicle": own}))
-            hull.thrust[w, i] = 1.0 + mismatch.thrust * (2.0 * thrust - 1.0)
+            hull.thrust[w, i] = thrust
     hull.broken[w] = _NEVER
     for f in range(len(scenario.faults)):
         for i in victims(key, f, scenario):
@@ -142,15 +137,15 @@ def weaken(w: int, tick: int, now: Columns, numbers: Actuation, hull: Hull) -> N
 
 
 @compiled_inline
-def followed(commanded: float, initial: float, half: float, whole: float) -> tuple[float, float, float]:
+def followed(commanded: float, initial: float, lag: Vector2) -> tuple[float, float, float]:
     """First-order lag at start, middle and end of a step: commanded + (initial - commanded) e^(-t / lag).
 
     Args:
         commanded: thrust [N] or torque [N m].
         initial: the actual value at the start, in the same unit.
-        half: e^(-t / lag) after half a step.
-        whole: e^(-t / lag) after a step; 0 without a lag.
+        lag: e^(-t / lag) after half a step and after a step; 0 without a lag.
     """
+    half, whole = lag
     if whole == 0.0:
         return commanded, commanded, commanded
     return initial, commanded + (initial - commanded) * half, commanded + (initial - commanded) * whole
@@ -170,8 +165,8 @@ def integrate_each(
         p, current = own_plant(w, i, hull), (flow[w, i, 0], flow[w, i, 1])
         for _ in range(rules.steps):
             state = now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i]
-            u_0, u_1, u_2 = followed(now.tau_u[i], hull.tau[w, i, 0], numbers.thrust_half, numbers.thrust_whole)
-            r_0, r_1, r_2 = followed(now.tau_r[i], hull.tau[w, i, 1], numbers.yaw_half, numbers.yaw_whole)
+            u_0, u_1, u_2 = followed(now.tau_u[i], hull.tau[w, i, 0], numbers.thrust_lag)
+            r_0, r_1, r_2 = followed(now.tau_r[i], hull.tau[w, i, 1], numbers.yaw_lag)
             now.x[i], now.y[i], now.psi[i], now.u[i], now.v[i], now.r[i] = advance_lagging(
                 state, (u_0, r_0), (u_1, r_1), (u_2, r_2), current, rules.step_s, p
             )

@@ -4,20 +4,19 @@ A vehicle's equations of motion hold relative to the water, which carries it alo
 (``uuv_marl.sim.vehicle.derivative``). The field is evaluated at each vehicle once per control step.
 """
 
-import itertools
 import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from uuv_marl.percept import MAX_SPEED, DisturbanceFields, Fields
+from uuv_marl.percept import DisturbanceFields, Fields
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.disturbance_sections import AROUND_M
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inline, compiled_inner
 from uuv_marl.sim.exponential import decay_mean, exp
-from uuv_marl.sim.perception import saturate
+from uuv_marl.sim.perception import body_velocity
 from uuv_marl.sim.random import DIRECTION, EDDY_PLACE, GUST, normals, uniform, uniforms
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
@@ -64,9 +63,10 @@ class FlowField(NamedTuple):
         points = np.asarray(points, np.float64)
         if points.shape[-1:] != (2,):
             raise ValueError(f"points must be north and east [m], shape (..., 2), got shape {points.shape}")
-        flow = Flow(self.drift[None], np.zeros((1, 2)), self.eddies[None], np.zeros((1, 0, 2)))
-        velocity = [flow_at(0, x, y, self.core_m, flow) for x, y in points.reshape(-1, 2).tolist()]
-        return np.array(velocity, np.float64).reshape(points.shape)
+        places = np.ascontiguousarray(points).reshape(1, -1, 2)
+        flow = Flow(self.drift[None], np.zeros((1, 2)), self.eddies[None], np.zeros(places.shape))
+        read_flow(0, places, self.core_m, flow)
+        return flow.flow.reshape(points.shape)
 
 
 def water(scenario: Scenario) -> WaterModel:
@@ -95,9 +95,9 @@ def sample_flow(w: int, key: np.uint64, waypoints: Float64, scenario: Scenario, 
     if flow.eddies.shape[1] > 0:
         low, high = waypoints.min(axis=0) - AROUND_M, waypoints.max(axis=0) + AROUND_M
         count = min(scenario.current.num_eddies(*np.ptp(waypoints, axis=0)), flow.eddies.shape[1])
-        for k, sign in zip(range(count), itertools.cycle((1.0, -1.0)), strict=False):
+        for k in range(count):
             flow.eddies[w, k, :2] = low + np.array(uniforms(key, EDDY_PLACE, 0, 0, k)) * (high - low)
-            flow.eddies[w, k, 2] = sign * water.circulation
+            flow.eddies[w, k, 2] = (-1.0) ** k * water.circulation
 
 
 @compiled_inline
@@ -112,17 +112,6 @@ def eddy_flow(dx: float, dy: float, circulation: float, core: float) -> tuple[fl
 
 
 @compiled
-def flow_at(w: int, x: float, y: float, core: float, flow: Flow) -> tuple[float, float]:
-    """Velocity of the water at a point, north and east [m/s]. ``core``: radius of the eddies' cores [m]."""
-    v_x, v_y = flow.mean[w, 0] + flow.gust[w, 0], flow.mean[w, 1] + flow.gust[w, 1]
-    for k in range(flow.eddies.shape[1]):
-        if flow.eddies[w, k, 2] != 0.0:
-            e_x, e_y = eddy_flow(x - flow.eddies[w, k, 0], y - flow.eddies[w, k, 1], flow.eddies[w, k, 2], core)
-            v_x, v_y = v_x + e_x, v_y + e_y
-    return v_x, v_y
-
-
-@compiled
 def advance_gust(w: int, key: np.uint64, tick: int, water: WaterModel, flow: Flow) -> None:
     """Advance the process by one control step exactly: mean and variance don't depend on the step's length.
 
@@ -134,16 +123,19 @@ def advance_gust(w: int, key: np.uint64, tick: int, water: WaterModel, flow: Flo
     flow.gust[w, 1] = water.remains * flow.gust[w, 1] + kick * east
 
 
-@compiled_inner
-def read_flow(w: int, state: State, water: WaterModel, flow: Flow) -> None:
-    """Evaluate the current at every vehicle of world w into ``flow.flow``."""
+@compiled
+def read_flow(w: int, eta: Float64, core: float, flow: Flow) -> None:
+    """Evaluate the current at every vehicle of world w, north and east in ``eta``, into ``flow.flow``.
+
+    ``core``: radius of the eddies' cores [m].
+    """
     everywhere = flow.mean[w, 0] + flow.gust[w, 0], flow.mean[w, 1] + flow.gust[w, 1]
-    for i in range(state.eta.shape[1]):
+    for i in range(eta.shape[1]):
         flow.flow[w, i, 0], flow.flow[w, i, 1] = everywhere
-    for k in range(flow.eddies.shape[1]):  # as flow_at, but eddy by eddy, which is vectorised
+    for k in range(flow.eddies.shape[1]):  # eddy by eddy, which is vectorised
         x, y, circulation = flow.eddies[w, k, 0], flow.eddies[w, k, 1], flow.eddies[w, k, 2]
-        for i in range(state.eta.shape[1] if circulation != 0.0 else 0):
-            north, east = eddy_flow(state.eta[w, i, 0] - x, state.eta[w, i, 1] - y, circulation, water.core)
+        for i in range(eta.shape[1] if circulation != 0.0 else 0):
+            north, east = eddy_flow(eta[w, i, 0] - x, eta[w, i, 1] - y, circulation, core)
             flow.flow[w, i, 0] += north
             flow.flow[w, i, 1] += east
 
@@ -166,7 +158,7 @@ def write_velocities(w: int, world: World, water: WaterModel, flow: Flow, see: F
             continue
         c, s = heading[w, i, 0], heading[w, i, 1]
         v_x, v_y = over_ground(w, i, state, flow)
-        ahead, abeam = saturate(c * v_x + s * v_y, MAX_SPEED), saturate(c * v_y - s * v_x, MAX_SPEED)
+        ahead, abeam = body_velocity(v_x, v_y, c, s)
         if more.ground_velocity.shape[2] > 0:
             more.ground_velocity[w, i, 0], more.ground_velocity[w, i, 1] = ahead, abeam
             more.water_velocity[w, i, 0], more.water_velocity[w, i, 1] = see.velocity[w, i, 0], see.velocity[w, i, 1]
@@ -176,5 +168,4 @@ def write_velocities(w: int, world: World, water: WaterModel, flow: Flow, see: F
             j = world.senses.detected_index[w, i, k]
             if j >= 0:
                 v_x, v_y = over_ground(w, j, state, flow)
-                see.link_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
-                see.link_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+                see.link_velocity[w, i, k, 0], see.link_velocity[w, i, k, 1] = body_velocity(v_x, v_y, c, s)

@@ -108,7 +108,7 @@ def integrate_disturbed(w: int, state: State, rules: Rules, now: Columns, d: Dis
 def advance_disturbances(w: int, world: World, d: Disturbances) -> None:
     """Update the disturbances at the end of a control step, which ``state.tick`` already counts."""
     current.advance_gust(w, d.keys[w], world.state.tick[w], d.water, d.flow)
-    current.read_flow(w, world.state, d.water, d.flow)
+    current.read_flow(w, world.state.eta, d.water.core, d.flow)
     navigation.drift_position(w, world.state, d.drift_share, d.navigation_errors)
     readings.remember(w, world.state, d.delay_line)
     modem.exchange(w, d.keys[w], world, d.modem_model, d.messages, d.flow, d.navigation_errors)
@@ -117,7 +117,7 @@ def advance_disturbances(w: int, world: World, d: Disturbances) -> None:
 @compiled_inner
 def begin_disturbances(w: int, world: World, d: Disturbances) -> None:
     """Start the disturbances from the present states, after a reset or once states were written by hand."""
-    current.read_flow(w, world.state, d.water, d.flow)
+    current.read_flow(w, world.state.eta, d.water.core, d.flow)
     d.navigation_errors.position_error[w] = 0.0
     noise.schedule_outages(w, d.keys[w], d.noise_model, d.sensor_errors)
     readings.begin_line(w, world.state, d.delay_line)

@@ -11,13 +11,13 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import MAX_SPEED, DisturbanceFields
+from uuv_marl.percept import DisturbanceFields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import World
 from uuv_marl.sim.compiled import compiled, compiled_inner
 from uuv_marl.sim.disturbances.current import Flow, over_ground
 from uuv_marl.sim.disturbances.navigation import NavigationErrors, by_compass
-from uuv_marl.sim.perception import saturate
+from uuv_marl.sim.perception import body_velocity
 from uuv_marl.sim.random import MESSAGE, uniform
 from uuv_marl.sim.tables import described
 from uuv_marl.types import Float64
@@ -86,6 +86,5 @@ def write_messages(w: int, world: World, messages: Messages, errors: NavigationE
                 continue
             v_x, v_y = messages.received[w, i, j, 0], messages.received[w, i, j, 1]
             more.modem_identity[w, i, k] = j + 1
-            more.modem_velocity[w, i, k, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
-            more.modem_velocity[w, i, k, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+            more.modem_velocity[w, i, k, 0], more.modem_velocity[w, i, k, 1] = body_velocity(v_x, v_y, c, s)
             more.modem_age[w, i, k] = min(now_s - messages.received[w, i, j, 2], _MAX_AGE_S)

@@ -9,10 +9,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import MAX_SPEED, Fields
+from uuv_marl.percept import Fields
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
-from uuv_marl.sim.perception import saturate, toward
+from uuv_marl.sim.perception import saturate, write_reference
 from uuv_marl.sim.random import COMPASS, DRIFT, normal, uniform
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
@@ -57,18 +57,12 @@ def by_compass(w: int, i: int, north: float, east: float, errors: NavigationErro
 @compiled_inner
 def navigate(w: int, world: World, errors: NavigationErrors, see: Fields) -> None:
     """Write l(t) and the compass into the percepts of world w as each vehicle's navigation estimates them."""
-    eta, heading, reference = world.state.eta, world.senses.heading, world.facts.reference
+    eta, heading = world.state.eta, world.senses.heading
     for i in range(eta.shape[1]):
         if not world.state.alive[w, i]:
             continue
         c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], errors)
-        if world.world_map.informed[w, i]:
-            l_t = reference[w, world.world_map.group[w, i]]
-            dx = l_t[0] - (eta[w, i, 0] + errors.position_error[w, i, 0])
-            dy = l_t[1] - (eta[w, i, 1] + errors.position_error[w, i, 1])
-            v_x, v_y = l_t[2], l_t[3]
-            see.reference[w, i, 0], see.reference[w, i, 1] = toward(dx, dy, c, s)
-            see.reference_velocity[w, i, 0] = saturate(c * v_x + s * v_y, MAX_SPEED)
-            see.reference_velocity[w, i, 1] = saturate(c * v_y - s * v_x, MAX_SPEED)
+        x, y = eta[w, i, 0] + errors.position_error[w, i, 0], eta[w, i, 1] + errors.position_error[w, i, 1]
+        write_reference(w, i, (x, y, c, s), world, see)
         if see.compass.shape[2] > 0:
             see.compass[w, i, 0], see.compass[w, i, 1] = saturate(c, 1.0), saturate(s, 1.0)

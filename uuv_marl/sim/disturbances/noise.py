@@ -17,8 +17,6 @@ from uuv_marl.sim.disturbances.readings import (
     FALSE_DETECTION,
     NO_DETECTION,
     OBSTACLE,
-    PLACE,
-    SHIFT,
     Detections,
     Readings,
     clear_array,
@@ -134,9 +132,7 @@ def drop_missed(at: Reading, num: int, key: np.uint64, noise: NoiseModel, detect
     """
     w, decades, half_range = at.w, noise.decades[at.a], noise.half_range[at.a]
     for q in range(num):
-        excess, _ = random.normals(
-            key, random.DETECTION, at.tick, detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE
-        )
+        excess, _ = random.normals(key, random.DETECTION, at.tick, detections.listener[w, q], detections.place[w, q])
         detections.first[w, q] = half_range * exp(decades * excess)
     for q in range(num):
         if detections.reach[w, q] >= detections.first[w, q]:
@@ -151,9 +147,8 @@ def sample_perturbations(at: Reading, num: int, key: np.uint64, noise: NoiseMode
     """
     w, bearing = at.w, noise.bearing
     for q in range(num):
-        side, off = random.normals(
-            key, random.BEARING_RANGE, at.tick, detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE
-        )
+        i, k = detections.listener[w, q], detections.place[w, q]
+        side, off = random.normals(key, random.BEARING_RANGE, at.tick, i, k)
         detections.first[w, q], detections.second[w, q] = cos_sin(bearing * side)
         detections.third[w, q] = off
 
@@ -172,7 +167,7 @@ def perturb(
         away = detections.reach[w, q]
         if away < 0.0:
             continue
-        factor = errors.factor[w, detections.code[w, q] >> SHIFT] if passive else 1.0
+        factor = errors.factor[w, detections.listener[w, q]] if passive else 1.0
         measured_range = max(factor * away + (noise.range_m + noise.range_share * away) * detections.third[w, q], 0.0)
         if not measured:
             measured_range = noise.nominal_range
@@ -216,9 +211,11 @@ def add_false_echoes(
     # Offset from an active array's sub-sectors to its echoes.
     beyond = 0 if passive else readings.target_index.shape[3] - timing.active[-1] + timing.active[a] - first
     for i in range(readings.target_index.shape[2]):
-        detections.code[w, i] = first + gap(random.uniform(key, random.FALSE_ECHO, at.tick, i, first), noise.false_echo)
+        detections.place[w, i] = first + gap(
+            random.uniform(key, random.FALSE_ECHO, at.tick, i, first), noise.false_echo
+        )
     for i in range(readings.target_index.shape[2]):
-        k = detections.code[w, i]
+        k = detections.place[w, i]
         while k < end:  # from one to the next, so that a vehicle without any costs one draw
             far, side = random.uniforms(key, random.FALSE_PLACE, at.tick, i, k)
             away = noise.range[a] * far if noise.passive_ranges or not passive else noise.nominal_range

@@ -57,7 +57,8 @@ class Readings(NamedTuple):
 class Detections(NamedTuple):
     """All detections of one array of all vehicles in a reading, one after the other."""
 
-    code: Annotated[Int64, "world detection", "Index of the listener, shifted left by ``SHIFT``, plus the place."]
+    listener: Annotated[Int64, "world detection", "Index of the vehicle that detects."]
+    place: Annotated[Int64, "world detection", "Place in its reading, as in ``Readings``."]
     target_index: Annotated[Int64, "world detection", "As in ``Readings``."]
     reach: Annotated[Float64, "world detection", "Range [m], negative if missed."]
     x: Annotated[Float64, "world detection", "Distance ahead [m]."]
@@ -65,10 +66,6 @@ class Detections(NamedTuple):
     first: Annotated[Float64, "world detection", "Buffer for random numbers."]
     second: Annotated[Float64, "world detection", "Buffer for random numbers."]
     third: Annotated[Float64, "world detection", "Buffer for random numbers."]
-
-
-SHIFT, PLACE = 32, (1 << 32) - 1
-"""Position of the listener in a detection's code, and the bits of the place."""
 
 
 def line_sizes(scenario: Scenario) -> dict[str, int]:
@@ -154,13 +151,14 @@ def collect(
                 ago = math.sqrt(ahead * ahead + abeam * abeam) * timing.control_steps_per_metre
                 north, east = was_at(w, j, at.tick, ago, readings)
                 ahead, abeam = c * (north - x) + s * (east - y), c * (east - y) - s * (north - x)
-            detections.code[w, num], detections.target_index[w, num] = (i << SHIFT) + k, j
+            detections.listener[w, num], detections.place[w, num], detections.target_index[w, num] = i, k, j
             detections.x[w, num], detections.y[w, num] = ahead, abeam
             detections.reach[w, num] = math.sqrt(ahead * ahead + abeam * abeam)
             num += 1
         for e in range(timing.active[a], timing.active[a + 1]):
             if see.echo[w, i, e] > 0.0:
-                detections.code[w, num], detections.target_index[w, num] = (i << SHIFT) + sectors + e, OBSTACLE
+                detections.listener[w, num], detections.place[w, num] = i, sectors + e
+                detections.target_index[w, num] = OBSTACLE
                 detections.x[w, num] = see.echo_position[w, i, e, 0]
                 detections.y[w, num] = see.echo_position[w, i, e, 1]
                 detections.reach[w, num] = see.echo_range[w, i, e]
@@ -176,7 +174,7 @@ def store(at: Reading, num: int, timing: SonarTiming, detections: Detections, re
     w, slot = at.w, at.slot
     for q in range(num):
         if detections.reach[w, q] >= 0.0:
-            i, k = detections.code[w, q] >> SHIFT, detections.code[w, q] & PLACE
+            i, k = detections.listener[w, q], detections.place[w, q]
             readings.target_index[w, slot, i, k] = detections.target_index[w, q]
             readings.reach[w, slot, i, k] = detections.reach[w, q]
             readings.position[w, slot, i, k, 0] = detections.x[w, q]

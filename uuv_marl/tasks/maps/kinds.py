@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from uuv_marl.sim.start import scatter
+from uuv_marl.sim.episode_setup import scatter
 from uuv_marl.tasks.maps.walls import INTO_BANK_M, Basin, MapKind, Range, Share, Span, between, joined, side, wall
 from uuv_marl.types import Float64
 
