@@ -88,15 +88,12 @@ def test_a_missing_library_names_its_extra():
         import uuv_marl.nothing  # noqa: F401
 
 
-@pytest.mark.parametrize(
-    ("module", "library", "name"),
-    [
-        ("envs.sb3", "stable_baselines3", "sb3"),
-        ("envs.torchrl", "torchrl", "torchrl"),
-        ("envs.benchmarl", "benchmarl", "benchmarl"),
-        ("envs.rllib", "ray", "distributed"),
-    ],
-)
+@pytest.mark.parametrize(("module", "library", "name"), [
+    ("envs.sb3", "stable_baselines3", "sb3"),
+    ("envs.torchrl", "torchrl", "torchrl"),
+    ("envs.benchmarl", "benchmarl", "benchmarl"),
+    ("envs.rllib", "ray", "distributed"),
+])  # fmt: skip
 def test_modules_of_optional_libraries_name_their_extra(module, library, name):
     code = f"import sys; sys.modules[{library!r}] = None; import uuv_marl.{module}"
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)

@@ -152,25 +152,22 @@ def test_the_parameters_listed_are_those_that_a_policy_s_name_takes(name):
     assert listed == set(str(error.value).partition("it has ")[2].split(", ")) - {"gains", "barrier", "none"}
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["benchmark", "--scenario=singel_obstacle"], "did you mean"),
-        (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must be greater than or equal to 0.001"),
-        (["list", "--show=trackin"], "did you mean"),
-        (["list", "policies", "--show=sf"], "did you mean 'sff'"),
-        (["benchmark", "--set=actuators.yaw_damping_nms=600"], "every policy has its own"),
-        (["benchmark", "--scenario=tracking", "--scenario=tracking"], "different names"),
-        (["benchmark", "--policy=:"], "policy ':' can't be imported"),
-        (["benchmark", "--policy=math:pi"], "must be a subclass"),
-        (["benchmark", "--set=name=../up"], "name must hold letters"),
-        (["benchmark", "--set=seed=1", "--set=seed=2"], "--set seed is given twice, as 1 and as 2; leave one out"),
-        (["train", "starter", "--seed=1", "--set=seed=2"], "--seed and --set seed are both given; leave one out"),
-        (["robustness", "--scenario=hard_water"], "has the task 'hard_water', and the suite scores 'follow' alone"),
-        (["robustness", "--axis=X", "--level=2"], "axis X has the levels 1, "),
-        (["tune", "--policy=idle"], "no free gains"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["benchmark", "--scenario=singel_obstacle"], "did you mean"),
+    (["benchmark", "--set=vehicle.m_kg=-1"], "vehicle.m_kg must be greater than or equal to 0.001"),
+    (["list", "--show=trackin"], "did you mean"),
+    (["list", "policies", "--show=sf"], "did you mean 'sff'"),
+    (["benchmark", "--set=actuators.yaw_damping_nms=600"], "every policy has its own"),
+    (["benchmark", "--scenario=tracking", "--scenario=tracking"], "different names"),
+    (["benchmark", "--policy=:"], "policy ':' can't be imported"),
+    (["benchmark", "--policy=math:pi"], "must be a subclass"),
+    (["benchmark", "--set=name=../up"], "name must hold letters"),
+    (["benchmark", "--set=seed=1", "--set=seed=2"], "--set seed is given twice, as 1 and as 2; leave one out"),
+    (["train", "starter", "--seed=1", "--set=seed=2"], "--seed and --set seed are both given; leave one out"),
+    (["robustness", "--scenario=hard_water"], "has the task 'hard_water', and the suite scores 'follow' alone"),
+    (["robustness", "--axis=X", "--level=2"], "axis X has the levels 1, "),
+    (["tune", "--policy=idle"], "no free gains"),
+])  # fmt: skip
 def test_mistakes_are_explained_without_a_traceback(arguments, message, tmp_path):
     status, text = cli(*arguments, *([f"--output={tmp_path}"] if arguments[0] != "list" else []))
     assert status == 2

@@ -86,20 +86,17 @@ def test_a_mask_of_other_worlds_is_refused(active):
         swarm.step(np.zeros((8, 2, 2), np.float32), np.asarray(active))
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("last", 9),
-        ("last", 0),
-        ("num_obstacles", -1),
-        ("num_obstacles", 1000),
-        ("losses", 1 << 40),
-        ("losses", -1),
-        ("detected_index", 6),
-        ("diverged", 77),
-        ("times", np.nan),
-    ],
-)
+@pytest.mark.parametrize(("name", "value"), [
+    ("last", 9),
+    ("last", 0),
+    ("num_obstacles", -1),
+    ("num_obstacles", 1000),
+    ("losses", 1 << 40),
+    ("losses", -1),
+    ("detected_index", 6),
+    ("diverged", 77),
+    ("times", np.nan),
+])  # fmt: skip
 def test_a_snapshot_holds_no_index_out_of_range(name, value):
     swarm = started("lossy", {"losses.times_s": [1.0]}, worlds=2, n=6)
     before, snapshot = swarm.snapshot(), swarm.snapshot()

@@ -18,14 +18,11 @@ def told(kinds=tuple(KINDS), vehicles=10, **changes):
     return with_policy_requirements("oracle", base)
 
 
-@pytest.mark.parametrize(
-    ("scenario", "vehicles", "kind"),
-    [
-        *(("hard_water", 10, kind) for kind in KINDS),
-        *(("hard_water", 54, kind) for kind in ("gate", "forest", "harbour")),
-        *((name, None, None) for name in ("two_swarms_easy", "two_swarms", "two_swarms_hard", "silent_targets_easy")),
-    ],
-)
+@pytest.mark.parametrize(("scenario", "vehicles", "kind"), [
+    *(("hard_water", 10, kind) for kind in KINDS),
+    *(("hard_water", 54, kind) for kind in ("gate", "forest", "harbour")),
+    *((name, None, None) for name in ("two_swarms_easy", "two_swarms", "two_swarms_hard", "silent_targets_easy")),
+])  # fmt: skip
 def test_the_oracle_succeeds_on_every_kind_of_map_without_a_collision(scenario, vehicles, kind):
     kinds = {"task.kinds": [kind]} if kind else {}
     runs = evaluate("oracle", scenario, range(FIRST, FIRST + 4), num_vehicles=vehicles, overrides=kinds)

@@ -183,18 +183,15 @@ def test_every_interface_draws_as_its_options_say_and_a_copy_alike():
     assert len({picture.tobytes() for picture in drawn[::4]}) == 4
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("big", "render_options: Input should be a valid dictionary"),
-        ({"siez": (3, 3)}, "render_options: siez is unknown; did you mean 'size'"),
-        ({"size": (10, 800)}, "size.0 must be greater than or equal to 320, got 10"),
-        ({"size": (800.5, 800)}, "size.0 must be a valid integer, got 800.5"),
-        ({"camera": np.zeros(2)}, "camera must be 'follow' or 'map', got"),
-        ({"camera": "fly"}, "camera must be 'follow' or 'map', got 'fly'"),
-        ({"sonar_of": 5}, r"\['sonar_of'\] must be the index of a vehicle, 0 to 4, or None, got 5"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    ("big", "render_options: Input should be a valid dictionary"),
+    ({"siez": (3, 3)}, "render_options: siez is unknown; did you mean 'size'"),
+    ({"size": (10, 800)}, "size.0 must be greater than or equal to 320, got 10"),
+    ({"size": (800.5, 800)}, "size.0 must be a valid integer, got 800.5"),
+    ({"camera": np.zeros(2)}, "camera must be 'follow' or 'map', got"),
+    ({"camera": "fly"}, "camera must be 'follow' or 'map', got 'fly'"),
+    ({"sonar_of": 5}, r"\['sonar_of'\] must be the index of a vehicle, 0 to 4, or None, got 5"),
+])  # fmt: skip
 def test_options_that_can_not_be_used_are_named(options, message):
     with pytest.raises(ValueError, match=message):
         uuv_marl.parallel_env("starter", render_mode="rgb_array", render_options=options)

@@ -238,19 +238,16 @@ def test_a_page_s_name_tells_changes_apart(tmp_path, monkeypatch, written):
     assert all(re.fullmatch(r"single_obstacle\.own_Mine\.0\.[0-9a-f]{8}\.html", name) for name in names)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--output=x.avi"], "--output x.avi must end in .html, .mp4, .gif or .png"),
-        (["--output=folder.html"], "is a folder; give a file in it"),
-        (["--inspect=8"], "vehicle 8 can't be inspected: single_obstacle has vehicles 0 to 7"),
-        ([f"--inspect={k}" for k in range(8)] + ["--set=swarm.num_vehicles=9", "--inspect=8"], "at most 8 vehicles"),
-        (["--inspect=1", "--inspect=2", "--output=x.mp4"], "a film shows the sonar of one vehicle, got 2"),
-        ([f"--policy={name}" for name in ("idle", "random", "sff", "sdc", "mappo")], "at most 4 policies"),
-        (["--set=sonar.channels=[]"], "every policy has its own"),
-        (["nowhere"], "nowhere/results.json can't be read (No such file or directory); give the folder of a benchmark"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["--output=x.avi"], "--output x.avi must end in .html, .mp4, .gif or .png"),
+    (["--output=folder.html"], "is a folder; give a file in it"),
+    (["--inspect=8"], "vehicle 8 can't be inspected: single_obstacle has vehicles 0 to 7"),
+    ([f"--inspect={k}" for k in range(8)] + ["--set=swarm.num_vehicles=9", "--inspect=8"], "at most 8 vehicles"),
+    (["--inspect=1", "--inspect=2", "--output=x.mp4"], "a film shows the sonar of one vehicle, got 2"),
+    ([f"--policy={name}" for name in ("idle", "random", "sff", "sdc", "mappo")], "at most 4 policies"),
+    (["--set=sonar.channels=[]"], "every policy has its own"),
+    (["nowhere"], "nowhere/results.json can't be read (No such file or directory); give the folder of a benchmark"),
+])  # fmt: skip
 def test_mistakes_are_explained_before_anything_is_simulated(arguments, message, tmp_path, monkeypatch, written):
     monkeypatch.chdir(tmp_path)
     Path("folder.html").mkdir()

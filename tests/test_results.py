@@ -43,20 +43,17 @@ def command(*arguments, output="results/benchmark"):
     return cli("benchmark", "--seeds=1", *arguments, f"--output={output}", *SETS)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda data: data.update(schema=1), "schema"),
-        (lambda data: data.pop("policies"), "policies"),
-        (lambda data: data.update(policies={}), "'idle', which is not described"),
-        (lambda data: data.update(policies={"idle": {}}), "policies.idle"),
-        (lambda data: data["runs"][0]["metrics"].pop("effort"), "runs.0.metrics.effort"),
-        (lambda data: data["runs"][0].update(seed="0"), "runs.0.seed"),
-        (lambda data: data["versions"].update(numpy="0.0.1"), r"comes from numpy 0\.0\.1, and here is"),
-        (lambda data: data["versions"].update(uuv_marl="0.0.1"), r"comes from uuv_marl 0\.0\.1, and here is"),
-        (lambda data: data.update(fingerprint="0"), "code 0, and here is"),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    (lambda data: data.update(schema=1), "schema"),
+    (lambda data: data.pop("policies"), "policies"),
+    (lambda data: data.update(policies={}), "'idle', which is not described"),
+    (lambda data: data.update(policies={"idle": {}}), "policies.idle"),
+    (lambda data: data["runs"][0]["metrics"].pop("effort"), "runs.0.metrics.effort"),
+    (lambda data: data["runs"][0].update(seed="0"), "runs.0.seed"),
+    (lambda data: data["versions"].update(numpy="0.0.1"), r"comes from numpy 0\.0\.1, and here is"),
+    (lambda data: data["versions"].update(uuv_marl="0.0.1"), r"comes from uuv_marl 0\.0\.1, and here is"),
+    (lambda data: data.update(fingerprint="0"), "code 0, and here is"),
+])  # fmt: skip
 def test_a_file_that_lacks_something_or_comes_from_elsewhere_is_refused_by_its_name(tmp_path, change, message):
     made(tmp_path)
     edit(tmp_path, change)
@@ -174,13 +171,10 @@ class Nan(Policy):
 """
 
 
-@pytest.mark.parametrize(
-    ("name", "messages"),
-    [
-        ("Misspelt", ["KeyError", "refrence", "users_own.py:7, in decide", "users_own.py:10, in towards"]),
-        ("Nan", ["policy 'users_own:Nan'", "action", "finite"]),
-    ],
-)
+@pytest.mark.parametrize(("name", "messages"), [
+    ("Misspelt", ["KeyError", "refrence", "users_own.py:7, in decide", "users_own.py:10, in towards"]),
+    ("Nan", ["policy 'users_own:Nan'", "action", "finite"]),
+])  # fmt: skip
 def test_an_error_in_a_users_policy_shows_the_users_lines_alone(tmp_path, monkeypatch, name, messages):
     (tmp_path / "users_own.py").write_text(USERS)
     monkeypatch.chdir(tmp_path)

@@ -92,15 +92,12 @@ def test_overrides_reach_every_level():
     assert mine["faults"] == [{"kind": "yaw", "share": 0.5}], "a caller's overrides stay as they are"
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("swarm.num_vehicles=20", ("swarm.num_vehicles", 20)),
-        ("sonar.echo_reports=surface", ("sonar.echo_reports", "surface")),
-        ('sonar.channels=["link"]', ("sonar.channels", ["link"])),
-        ("collision.ends_vehicle = true", ("collision.ends_vehicle", True)),
-    ],
-)
+@pytest.mark.parametrize(("text", "expected"), [
+    ("swarm.num_vehicles=20", ("swarm.num_vehicles", 20)),
+    ("sonar.echo_reports=surface", ("sonar.echo_reports", "surface")),
+    ('sonar.channels=["link"]', ("sonar.channels", ["link"])),
+    ("collision.ends_vehicle = true", ("collision.ends_vehicle", True)),
+])  # fmt: skip
 def test_overrides_from_the_command_line(text, expected):
     assert parse_override(text) == expected
 
@@ -219,20 +216,17 @@ def test_bad_values_name_field_value_and_remedy(scenario, overrides, message):
         Swarm(load_scenario(scenario, overrides=overrides))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"scenario": 5}, "scenario must be a name, a path ending in .toml, or a Scenario, got 5"),
-        ({"scenario": "single_obstcle"}, "did you mean 'single_obstacle'"),
-        ({"scenario": "mycourse"}, "scenario 'mycourse' is unknown; give one of few_informed, .* or a path"),
-        ({"scenario": "x" * 5000 + ".toml"}, "scenario file 'xxx.*... does not exist"),
-        ({"num_vehicles": True}, "swarm.num_vehicles must be a valid integer, got True"),
-        ({"overrides": "x"}, "overrides must be a dictionary of fields and values, got 'x'"),
-        ({"overrides": {"swarm.num_vehicles": iter([1])}}, "swarm.num_vehicles must be"),
-        ({"scenario": "random_field", "overrides": {"random_field.legs": [3, 1]}}, "random_field.legs"),
-        ({"scenario": "random_field", "overrides": {"random_field.obstacles": [0, 100]}}, "random_field.obstacles"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "message"), [
+    ({"scenario": 5}, "scenario must be a name, a path ending in .toml, or a Scenario, got 5"),
+    ({"scenario": "single_obstcle"}, "did you mean 'single_obstacle'"),
+    ({"scenario": "mycourse"}, "scenario 'mycourse' is unknown; give one of few_informed, .* or a path"),
+    ({"scenario": "x" * 5000 + ".toml"}, "scenario file 'xxx.*... does not exist"),
+    ({"num_vehicles": True}, "swarm.num_vehicles must be a valid integer, got True"),
+    ({"overrides": "x"}, "overrides must be a dictionary of fields and values, got 'x'"),
+    ({"overrides": {"swarm.num_vehicles": iter([1])}}, "swarm.num_vehicles must be"),
+    ({"scenario": "random_field", "overrides": {"random_field.legs": [3, 1]}}, "random_field.legs"),
+    ({"scenario": "random_field", "overrides": {"random_field.obstacles": [0, 100]}}, "random_field.obstacles"),
+])  # fmt: skip
 def test_bad_arguments_are_named(arguments, message):
     with pytest.raises(ScenarioError, match=message):
         load_scenario(**{"scenario": BASE, **arguments})
@@ -253,20 +247,16 @@ def test_a_file_extends_one_beside_it(tmp_path):
         load_scenario((tmp_path / "b.toml").rename(tmp_path / "my b.toml"))
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ('extends = "../here/mine.toml"\n', "must not lead back"),
-        ("extends = 3\n", "extends must be a scenario's name or file, got 3"),
-        ("\udcff", "not valid TOML"),
-        ("[swarm\n", "mine.toml is not valid TOML: .*line 1"),
-        ('title = "x"\nsource = "x"\nversion = 1\n', "trajectory.waypoints_m is needed"),
-        ("x = " + "[" * 3000, "nested too deeply"),
-        ("x = " + "9" * 5000, "not valid TOML"),
-        ("x = 1 #" + " " * 1_000_000, "not a scenario: it has more than 1,000,000 bytes"),
-    ],
-    ids=range(8),
-)
+@pytest.mark.parametrize(("text", "message"), [
+    ('extends = "../here/mine.toml"\n', "must not lead back"),
+    ("extends = 3\n", "extends must be a scenario's name or file, got 3"),
+    ("\udcff", "not valid TOML"),
+    ("[swarm\n", "mine.toml is not valid TOML: .*line 1"),
+    ('title = "x"\nsource = "x"\nversion = 1\n', "trajectory.waypoints_m is needed"),
+    ("x = " + "[" * 3000, "nested too deeply"),
+    ("x = " + "9" * 5000, "not valid TOML"),
+    ("x = 1 #" + " " * 1_000_000, "not a scenario: it has more than 1,000,000 bytes"),
+], ids=range(8))  # fmt: skip
 def test_a_file_that_is_no_scenario_is_refused(tmp_path, text, message):
     (tmp_path / "here").mkdir()
     (tmp_path / "here" / "mine.toml").write_bytes(text.encode("utf-8", "surrogateescape"))
@@ -323,15 +313,11 @@ for what in ('scenarios', 'policies'): assert CliRunner().invoke(app, ['list', w
 """
 
 
-@pytest.mark.parametrize(
-    ("code", "heavy"),
-    [
-        ("import uuv_marl", {"numba", "torch", "matplotlib", "ray"}),
-        (READ_TWO, {"numba", "scipy"}),
-        (LIST_ALL, {"matplotlib", "scipy.stats"}),
-    ],
-    ids=["import", "load_scenario", "uuv-marl list"],
-)
+@pytest.mark.parametrize(("code", "heavy"), [
+    ("import uuv_marl", {"numba", "torch", "matplotlib", "ray"}),
+    (READ_TWO, {"numba", "scipy"}),
+    (LIST_ALL, {"matplotlib", "scipy.stats"}),
+], ids=["import", "load_scenario", "uuv-marl list"])  # fmt: skip
 def test_light_work_imports_nothing_heavy(code, heavy):
     python(f"{code}\nimport sys; assert not {heavy!r} & set(sys.modules)")
 
@@ -375,22 +361,19 @@ def test_a_vehicle_of_one_s_own_takes_nothing_from_the_paper_s(tmp_path):
     assert load_scenario(path).vehicle == own.vehicle
 
 
-@pytest.mark.parametrize(
-    ("field", "same", "given"),
-    [
-        ("sonar.channels", ["compass"], UserList(["compass"])),
-        ("sonar.channels", ["compass"], np.array(["compass"])),
-        ("swarm.num_vehicles", 7, np.int64(7)),
-        ("swarm.num_vehicles", 7, np.array(7)),
-        ("collision.ends_vehicle", True, np.bool_(True)),
-        ("collision.ends_vehicle", True, np.array(True)),
-        ("losses.times_s", [1.0, 2.5], np.array([1.0, 2.5], np.float32)),
-        ("trajectory.speed_mps", 3.5, np.float32(3.5)),
-        ("trajectory.speed_mps", 3.5, Fraction(7, 2)),
-        ("obstacles", [{"centre_m": [1.0, 2.0], "radius_m": 3.0}],
-         UserList([UserDict(centre_m=np.array([1.0, 2.0]), radius_m=np.float64(3.0))])),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("field", "same", "given"), [
+    ("sonar.channels", ["compass"], UserList(["compass"])),
+    ("sonar.channels", ["compass"], np.array(["compass"])),
+    ("swarm.num_vehicles", 7, np.int64(7)),
+    ("swarm.num_vehicles", 7, np.array(7)),
+    ("collision.ends_vehicle", True, np.bool_(True)),
+    ("collision.ends_vehicle", True, np.array(True)),
+    ("losses.times_s", [1.0, 2.5], np.array([1.0, 2.5], np.float32)),
+    ("trajectory.speed_mps", 3.5, np.float32(3.5)),
+    ("trajectory.speed_mps", 3.5, Fraction(7, 2)),
+    ("obstacles", [{"centre_m": [1.0, 2.0], "radius_m": 3.0}],
+     UserList([UserDict(centre_m=np.array([1.0, 2.0]), radius_m=np.float64(3.0))])),
+])  # fmt: skip
 def test_a_value_of_an_override_is_taken_for_what_it_can_do(field, same, given):
     assert load_scenario("lossy", overrides={field: given}) == load_scenario("lossy", overrides={field: same})
     path = field.split(".")

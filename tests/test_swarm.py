@@ -168,18 +168,15 @@ PASSING = {"arrival.criterion": "passage", "trajectory.waypoints_m": [[0.0, 0.0]
 SPREAD = np.array([[-3.0, -3.0], [3.0, -3.0], [-3.0, 3.0], [3.0, 3.0]])
 
 
-@pytest.mark.parametrize(
-    ("centre", "scattered", "time_s", "arrives"),
-    [
-        ((100.0, 59.9), 1.0, 50.0, False),
-        ((100.0, 60.1), 1.0, 50.0, True),
-        ((104.0, 60.1), 1.0, 50.0, True),
-        ((108.0, 60.1), 1.0, 50.0, False),
-        ((100.0, 90.0), 1.0, 50.0, True),
-        ((100.0, 60.1), 3.0, 50.0, False),
-        ((100.0, 60.1), 1.0, 39.8, False),
-    ],
-)
+@pytest.mark.parametrize(("centre", "scattered", "time_s", "arrives"), [
+    ((100.0, 59.9), 1.0, 50.0, False),
+    ((100.0, 60.1), 1.0, 50.0, True),
+    ((104.0, 60.1), 1.0, 50.0, True),
+    ((108.0, 60.1), 1.0, 50.0, False),
+    ((100.0, 90.0), 1.0, 50.0, True),
+    ((100.0, 60.1), 3.0, 50.0, False),
+    ((100.0, 60.1), 1.0, 39.8, False),
+])  # fmt: skip
 def test_a_swarm_arrives_as_its_centre_crosses_the_line_through_the_end_together(centre, scattered, time_s, arrives):
     """And l(t) has: its path of 160 m takes 40 s."""
     swarm = started("tracking", PASSING, n=4)

@@ -370,19 +370,16 @@ def own_task(tmp_path, monkeypatch):
 NEARER = {"name": "own_task:Nearer", "near_m": 20.0}
 
 
-@pytest.mark.parametrize(
-    ("fields", "cost"),
-    [
-        ({}, (1.0, 300.0)),
-        ({"scenario": "few_informed", "reward": "leader"}, (1.0, 300.0)),
-        ({"reward": "own_task:mine"}, (0.0, 0.0)),
-        ({"overrides": {"task": "own_task:Mine"}}, (0.0, 0.0)),
-        ({"overrides": {"task": "own_task:Mine"}, "extra_scenarios": ["starter"]}, (0.0, 0.0)),
-        ({"overrides": {"task": NEARER}}, (0.0, 0.0)),
-        ({"overrides": {"task": NEARER}, "ppo": {"collision_cost": (2.0, 5.0)}}, (2.0, 5.0)),
-        ({"ppo": {"collision_cost": (0.0, 0.0)}}, (0.0, 0.0)),
-    ],
-)
+@pytest.mark.parametrize(("fields", "cost"), [
+    ({}, (1.0, 300.0)),
+    ({"scenario": "few_informed", "reward": "leader"}, (1.0, 300.0)),
+    ({"reward": "own_task:mine"}, (0.0, 0.0)),
+    ({"overrides": {"task": "own_task:Mine"}}, (0.0, 0.0)),
+    ({"overrides": {"task": "own_task:Mine"}, "extra_scenarios": ["starter"]}, (0.0, 0.0)),
+    ({"overrides": {"task": NEARER}}, (0.0, 0.0)),
+    ({"overrides": {"task": NEARER}, "ppo": {"collision_cost": (2.0, 5.0)}}, (2.0, 5.0)),
+    ({"ppo": {"collision_cost": (0.0, 0.0)}}, (0.0, 0.0)),
+])  # fmt: skip
 def test_collisions_cost_nothing_beyond_a_reward_of_ones_own(fields, cost, own_task):
     training = Training(**fields)
     assert training.ppo.collision_cost == cost
@@ -606,19 +603,15 @@ def rows(folder):
         return list(csv.DictReader(file))
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        {},
-        {"network": {"kind": "sectors", "hidden": (8,)}},
-        {"filter": True},
-        {"base_controller": "random"},
-        {"base_controller": "scout"},
-        {"expert": "scout", "imitation_share": 0.3},
-        {"expert": "scout", "imitation_share": 0.3, "imitation_weight": 2.0},
-    ],
-    ids=["gru", "sectors", "filter", "random", "scout", "imitation", "weight"],
-)
+@pytest.mark.parametrize("kind", [
+    {},
+    {"network": {"kind": "sectors", "hidden": (8,)}},
+    {"filter": True},
+    {"base_controller": "random"},
+    {"base_controller": "scout"},
+    {"expert": "scout", "imitation_share": 0.3},
+    {"expert": "scout", "imitation_share": 0.3, "imitation_weight": 2.0},
+], ids=["gru", "sectors", "filter", "random", "scout", "imitation", "weight"])  # fmt: skip
 def test_a_resumed_training_equals_an_uninterrupted_one(kind, tmp_path, no_validation):
     """Bit for bit: weights, optimiser, memories, worlds and random numbers; stopped after a checkpoint, and between."""
     kind = {"validations": 1, **kind}
@@ -876,19 +869,16 @@ def spoilt(change):
     return lambda data: safetensors.numpy.save(change(safetensors.numpy.load(data)))
 
 
-@pytest.mark.parametrize(
-    ("name", "damage"),
-    [
-        *itertools.product(("learner.safetensors", "random.json", "config.json"), DAMAGES.values()),
-        ("worlds.safetensors", DAMAGES["cut off"]),
-        ("record.json", DAMAGES["no JSON object"]),
-        ("learner.safetensors", spoilt(lambda a: a | {"actor.0.weight": np.full_like(a["actor.0.weight"], np.nan)})),
-        ("learner.safetensors", spoilt(lambda a: a | {"actor.0.weight": a["actor.0.weight"][:3]})),
-        ("learner.safetensors", spoilt(lambda a: a | {"state": a["state"][:3]})),
-        ("worlds.safetensors", spoilt(lambda a: {k: v for k, v in a.items() if not k.startswith("1.")})),
-        ("worlds.safetensors", spoilt(lambda a: a | {"0.eta": a["0.eta"][:, :2]})),
-    ],
-)
+@pytest.mark.parametrize(("name", "damage"), [
+    *itertools.product(("learner.safetensors", "random.json", "config.json"), DAMAGES.values()),
+    ("worlds.safetensors", DAMAGES["cut off"]),
+    ("record.json", DAMAGES["no JSON object"]),
+    ("learner.safetensors", spoilt(lambda a: a | {"actor.0.weight": np.full_like(a["actor.0.weight"], np.nan)})),
+    ("learner.safetensors", spoilt(lambda a: a | {"actor.0.weight": a["actor.0.weight"][:3]})),
+    ("learner.safetensors", spoilt(lambda a: a | {"state": a["state"][:3]})),
+    ("worlds.safetensors", spoilt(lambda a: {k: v for k, v in a.items() if not k.startswith("1.")})),
+    ("worlds.safetensors", spoilt(lambda a: a | {"0.eta": a["0.eta"][:, :2]})),
+])  # fmt: skip
 def test_a_damaged_file_is_named_with_the_remedy(name, damage, kept, tmp_path):
     shutil.copytree(kept, tmp_path / "a")
     path = tmp_path / "a" / name if name == "config.json" else tmp_path / "a" / "checkpoints" / "000002" / name
@@ -926,21 +916,18 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
     assert recipe_fields("starter") == {"scenario": "starter"}
 
 
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"ppo": {"learning_rate": (np.inf, 0.1)}}, "ppo.learning_rate.0 must be a finite number, got inf"),
-        ({"ppo": {"noize": 0.1}}, "ppo.noize is unknown; did you mean 'ppo.noise'"),
-        ({"network": {"kind": "cnn"}}, "network.kind must be 'mlp', 'sectors' or 'moments', got 'cnn'"),
-        ({"minutes": 1, "steps": 100}, "minutes = 1 and steps = 100 are both given; leave one out"),
-        ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
-        ({"base_controller": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
-        ({"base_controller": "scout", "expert": "scout"}, "and base_controller 'scout' are both given; leave one out"),
-        ({"imitation_weight": 2.0}, "imitation_weight = 2 needs an expert, and none is given; name one, or leave"),
-        ({"sizes": [[5, -1]]}, "sizes.0.1 must be greater than or equal to 0, got -1"),
-        ({"extra_scenarios": ["few_informed"]}, "has 'few_informed' with another percept than 'starter', and one"),
-    ],
-)
+@pytest.mark.parametrize(("wrong", "message"), [
+    ({"ppo": {"learning_rate": (np.inf, 0.1)}}, "ppo.learning_rate.0 must be a finite number, got inf"),
+    ({"ppo": {"noize": 0.1}}, "ppo.noize is unknown; did you mean 'ppo.noise'"),
+    ({"network": {"kind": "cnn"}}, "network.kind must be 'mlp', 'sectors' or 'moments', got 'cnn'"),
+    ({"minutes": 1, "steps": 100}, "minutes = 1 and steps = 100 are both given; leave one out"),
+    ({"reward": "geodesic"}, "reward must be one of dense, sparse, team, the rewards of task 'follow'"),
+    ({"base_controller": "scoot"}, "policy 'scoot' is unknown; did you mean 'scout'?"),
+    ({"base_controller": "scout", "expert": "scout"}, "and base_controller 'scout' are both given; leave one out"),
+    ({"imitation_weight": 2.0}, "imitation_weight = 2 needs an expert, and none is given; name one, or leave"),
+    ({"sizes": [[5, -1]]}, "sizes.0.1 must be greater than or equal to 0, got -1"),
+    ({"extra_scenarios": ["few_informed"]}, "has 'few_informed' with another percept than 'starter', and one"),
+])  # fmt: skip
 def test_fields_that_cannot_be_trained_with_are_named_with_the_remedy(wrong, message):
     with pytest.raises((TrainingError, ScenarioError, PolicyError), match=re.escape(message)):
         _ = Training(**wrong).loaded
@@ -1007,14 +994,11 @@ def test_the_command_goes_on_with_what_the_folder_holds(tmp_path, no_validation)
     assert "the budget was already spent" in cli("train", "--resume", f"--output={tmp_path}")[1]
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--steps=3.5"], "'3.5' is not a whole number from 1 on"),
-        (["nowhere"], "scenario 'nowhere'"),
-        (["nowhere.toml"], "nowhere.toml can't be read"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    (["--steps=3.5"], "'3.5' is not a whole number from 1 on"),
+    (["nowhere"], "scenario 'nowhere'"),
+    (["nowhere.toml"], "nowhere.toml can't be read"),
+])  # fmt: skip
 def test_options_that_cannot_work_are_explained(options, message, tmp_path):
     status, output = cli("train", f"--output={tmp_path / 'a'}", *options)
     assert status == 2

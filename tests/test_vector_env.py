@@ -238,17 +238,14 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
 SLOW_LAUV = {"vehicle": "lauv", "trajectory.speed_mps": 1.5, "start.speed_max_mps": 1.5}
 
 
-@pytest.mark.parametrize(
-    ("scenario", "others", "how", "message"),
-    [
-        (STARTER, "bio_inspired", {"sonar.channels": ["compass"]}, "can't hold compass: .* 'bio_inspired' requires no"),
-        (STARTER, "bio_inspired", {"actuators.yaw_damping_nms": 600.0}, "can't be 600: .* 'bio_inspired' requires 0"),
-        (STARTER, "mappo", {"timing.decision_period_s": 0.2}, "can't be 0.2: policy 'mappo' requires 0.5; leave"),
-        (STARTER, "mappo", {"timing": {"decision_period_s": 0.1}}, "can't be 0.1: policy 'mappo' requires 0.5; leave"),
-        (STARTER, "mappo", {"timing": uuv_marl.load_scenario(STARTER).timing}, "can't be 0.1: .* 'mappo' requires 0.5"),
-        ("tracking", "mappo", SLOW_LAUV, "another vehicle"),  # and not for a period that was not asked for
-    ],
-)
+@pytest.mark.parametrize(("scenario", "others", "how", "message"), [
+    (STARTER, "bio_inspired", {"sonar.channels": ["compass"]}, "can't hold compass: .* 'bio_inspired' requires no"),
+    (STARTER, "bio_inspired", {"actuators.yaw_damping_nms": 600.0}, "can't be 600: .* 'bio_inspired' requires 0"),
+    (STARTER, "mappo", {"timing.decision_period_s": 0.2}, "can't be 0.2: policy 'mappo' requires 0.5; leave"),
+    (STARTER, "mappo", {"timing": {"decision_period_s": 0.1}}, "can't be 0.1: policy 'mappo' requires 0.5; leave"),
+    (STARTER, "mappo", {"timing": uuv_marl.load_scenario(STARTER).timing}, "can't be 0.1: .* 'mappo' requires 0.5"),
+    ("tracking", "mappo", SLOW_LAUV, "another vehicle"),  # and not for a period that was not asked for
+])  # fmt: skip
 def test_solo_drops_no_override(scenario, others, how, message):
     with pytest.raises((ScenarioError, baselines.PolicyError), match=message):
         SoloEnv(scenario, others, overrides=how)
@@ -348,20 +345,17 @@ def test_a_spec_with_a_scenario_goes_through_json():
         uuv_marl.load_scenario({**scenario.model_dump(), "swarm": {"num_vehicles": "x"}})
 
 
-@pytest.mark.parametrize(
-    ("place", "given", "message"),
-    [
-        ("parallel_env:parallel_env", (10,), "scenario must be .*, got 10; .* is scenario, the second num_vehicles"),
-        ("parallel_env:env", (np.int64(4), "starter"), "scenario must be .*; .* is scenario, the second num_vehicles"),
-        ("vector_env:vector_env", ("starter", 4), "scenario must be .*, got 4; .* is num_envs, the second scenario"),
-        ("vector_env:vector_env", ("starter",), "num_envs must be .*, got 'starter'; .* is num_envs, the second"),
-        ("core:make_batched_env", (2, "starter"), "scenario must be .*; .* is scenario, the second num_worlds"),
-        ("sb3:SwarmVecEnv", (2, "starter"), "scenario must be .*, got 2; .* is scenario, the second num_worlds"),
-        ("sb3:SwarmVecEnv", ("starter", "2"), "num_worlds must be .*, got '2'; .* is scenario, the second num_worlds"),
-        ("solo:SoloEnv", (2, "starter"), "scenario must be .*, got 2; .* is scenario, the second others"),
-        ("torchrl:SwarmEnv", ("starter", 4), "scenario must be .*, got 4; .* is num_worlds, the second scenario"),
-    ],
-)
+@pytest.mark.parametrize(("place", "given", "message"), [
+    ("parallel_env:parallel_env", (10,), "scenario must be .*, got 10; .* is scenario, the second num_vehicles"),
+    ("parallel_env:env", (np.int64(4), "starter"), "scenario must be .*; .* is scenario, the second num_vehicles"),
+    ("vector_env:vector_env", ("starter", 4), "scenario must be .*, got 4; .* is num_envs, the second scenario"),
+    ("vector_env:vector_env", ("starter",), "num_envs must be .*, got 'starter'; .* is num_envs, the second"),
+    ("core:make_batched_env", (2, "starter"), "scenario must be .*; .* is scenario, the second num_worlds"),
+    ("sb3:SwarmVecEnv", (2, "starter"), "scenario must be .*, got 2; .* is scenario, the second num_worlds"),
+    ("sb3:SwarmVecEnv", ("starter", "2"), "num_worlds must be .*, got '2'; .* is scenario, the second num_worlds"),
+    ("solo:SoloEnv", (2, "starter"), "scenario must be .*, got 2; .* is scenario, the second others"),
+    ("torchrl:SwarmEnv", ("starter", 4), "scenario must be .*, got 4; .* is num_worlds, the second scenario"),
+])  # fmt: skip
 def test_arguments_in_another_order_are_refused_with_the_right_one(place, given, message):
     module, _, name = place.partition(":")
     pytest.importorskip({"sb3": "stable_baselines3", "torchrl": "torchrl"}.get(module, "gymnasium"))
@@ -370,13 +364,10 @@ def test_arguments_in_another_order_are_refused_with_the_right_one(place, given,
         make(*given)
 
 
-@pytest.mark.parametrize(
-    ("place", "first"),
-    [
-        ("parallel_env:parallel_env", ()), ("vector_env:vector_env", (2,)), ("sb3:SwarmVecEnv", ()),
-        ("torchrl:SwarmEnv", (2,)), ("rllib:SwarmMultiAgentEnv", None),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("place", "first"), [
+    ("parallel_env:parallel_env", ()), ("vector_env:vector_env", (2,)), ("sb3:SwarmVecEnv", ()),
+    ("torchrl:SwarmEnv", (2,)), ("rllib:SwarmMultiAgentEnv", None),
+])  # fmt: skip
 def test_every_environment_gives_the_scenario_what_a_policy_requires(place, first):
     module, _, name = place.partition(":")
     pytest.importorskip({"sb3": "stable_baselines3", "torchrl": "torchrl", "rllib": "ray"}.get(module, "gymnasium"))

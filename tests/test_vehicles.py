@@ -151,18 +151,15 @@ def test_a_file_of_ones_own_has_variants_too(tmp_path):
 HEAVY = "\n[variants.heavy.vehicle]\n"
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "name", "message"),
-    [
-        (r"\Z", f"{HEAVY}m_kg = 25.0", "+havy", "has no variant 'havy'; it has heavy"),
-        (r"\Z", "\n[variants.heavy]\nm_kg = 25.0", "+heavy", "must hold tables, such as [variants.heavy.vehicle]"),
-        (r"\Z", f"{HEAVY}mass = 25.0", "+heavy", "vehicle.mass is unknown"),
-        ("^m_kg = .*", "", "", "lacks vehicle.m_kg; add this number to the file"),
-        ("^lever_arm_m = .*", "", "", "lacks actuators.lever_arm_m"),
-        (r"^\[vehicle\]", "[swarm]\nnum_vehicles = 3\n[vehicle]", "", "may hold vehicle and actuators only"),
-        ("^m_kg = .*", "m_kg = ", "", "is not valid TOML"),
-    ],
-)
+@pytest.mark.parametrize(("before", "after", "name", "message"), [
+    (r"\Z", f"{HEAVY}m_kg = 25.0", "+havy", "has no variant 'havy'; it has heavy"),
+    (r"\Z", "\n[variants.heavy]\nm_kg = 25.0", "+heavy", "must hold tables, such as [variants.heavy.vehicle]"),
+    (r"\Z", f"{HEAVY}mass = 25.0", "+heavy", "vehicle.mass is unknown"),
+    ("^m_kg = .*", "", "", "lacks vehicle.m_kg; add this number to the file"),
+    ("^lever_arm_m = .*", "", "", "lacks actuators.lever_arm_m"),
+    (r"^\[vehicle\]", "[swarm]\nnum_vehicles = 3\n[vehicle]", "", "may hold vehicle and actuators only"),
+    ("^m_kg = .*", "m_kg = ", "", "is not valid TOML"),
+])  # fmt: skip
 def test_a_vehicle_file_that_is_not_complete_or_lacks_a_variant_is_refused(before, after, name, message, tmp_path):
     own, (text, changes) = tmp_path / "mine.toml", re.subn(before, after, show_vehicle("lauv"), count=1, flags=re.M)
     assert changes == 1

@@ -47,16 +47,12 @@ def copied(folder, name, wanted, **changes):
 
 
 @SAME_BITS
-@pytest.mark.parametrize(
-    ("name", "wanted"),
-    [
-        ("heldout.csv.gz", N10),
-        ("heldout.csv.gz", N10 | {"policy": "mappo_2"}),
-        ("robustness.csv.gz", {"axis": "A1", "level": "3", "policy": "mappo", "seed": "3"}),
-        ("paper.csv.gz", {"policy": "sdc", "seed": "4"}),
-    ],
-    ids=["heldout", "second training", "robustness", "paper"],
-)
+@pytest.mark.parametrize(("name", "wanted"), [
+    ("heldout.csv.gz", N10),
+    ("heldout.csv.gz", N10 | {"policy": "mappo_2"}),
+    ("robustness.csv.gz", {"axis": "A1", "level": "3", "policy": "mappo", "seed": "3"}),
+    ("paper.csv.gz", {"policy": "sdc", "seed": "4"}),
+], ids=["heldout", "second training", "robustness", "paper"])  # fmt: skip
 def test_shipped_rows_come_out_again(tmp_path, name, wanted):
     path, _ = copied(tmp_path, name, wanted)
     code, output = verify(path)
@@ -94,16 +90,13 @@ def test_the_runs_of_a_benchmark_are_compared_in_full(results, tmp_path):
     assert "2 more can't be reproduced here" in output
 
 
-@pytest.mark.parametrize(
-    ("changes", "reason"),
-    [
-        ({"policy": "mapo"}, "policy 'mapo' is unknown; did you mean 'mappo'?"),
-        ({"set": "nowhere"}, "there is no set 'nowhere' in this version"),
-        ({"policy": "evil:Law"}, "policy 'evil:Law' is not part of the package"),
-        ({"policy": "runs/best"}, "policy 'runs/best' is not part of the package"),
-        ({"policy": "evil:Law,own_clock=true"}, "policy 'evil:Law,own_clock=true' is not part of the package"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "reason"), [
+    ({"policy": "mapo"}, "policy 'mapo' is unknown; did you mean 'mappo'?"),
+    ({"set": "nowhere"}, "there is no set 'nowhere' in this version"),
+    ({"policy": "evil:Law"}, "policy 'evil:Law' is not part of the package"),
+    ({"policy": "runs/best"}, "policy 'runs/best' is not part of the package"),
+    ({"policy": "evil:Law,own_clock=true"}, "policy 'evil:Law,own_clock=true' is not part of the package"),
+])  # fmt: skip
 def test_what_cannot_be_run_here_is_named_and_counts_for_nothing(tmp_path, changes, reason):
     (tmp_path / "evil.py").write_text("open('ran', 'w')")
     path, _ = copied(tmp_path, "heldout.csv.gz", N10, **changes)
@@ -125,17 +118,14 @@ def test_every_kind_of_shipped_row_knows_what_it_is_made_of():
             assert row.kind.source(row.cells).policy, row.where
 
 
-@pytest.mark.parametrize(
-    ("changes", "reason"),
-    [
-        ({}, ""),
-        ({"learner": "evil:Law"}, "policy 'evil:Law' is not part of the package"),
-        ({"learner": "research.blind:Blind,inner=evil:Law"}, "is not part of the package"),
-        ({"learner": "other", "training": "0"}, "there is no training '0' of a learner 'other' in this version"),
-        ({"learner": "IPPO", "training": "7"}, "no policy of this training is kept"),
-        ({"set": "nowhere"}, "there is no set 'nowhere' of task 'hard_water' in this version"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "reason"), [
+    ({}, ""),
+    ({"learner": "evil:Law"}, "policy 'evil:Law' is not part of the package"),
+    ({"learner": "research.blind:Blind,inner=evil:Law"}, "is not part of the package"),
+    ({"learner": "other", "training": "0"}, "there is no training '0' of a learner 'other' in this version"),
+    ({"learner": "IPPO", "training": "7"}, "no policy of this training is kept"),
+    ({"set": "nowhere"}, "there is no set 'nowhere' of task 'hard_water' in this version"),
+])  # fmt: skip
 def test_rows_of_learners_come_out_again_and_run_nothing_from_elsewhere(tmp_path, changes, reason):
     (row,) = cells.episodes("scout", TASKS["hard_water"].sets[0], range(7000, 7001))
     place = {"task": "hard_water", "learner": "scout", "training": ""}

@@ -92,17 +92,14 @@ def test_messages_use_the_terms_of_the_field():
 
 
 @pytest.mark.docs
-@pytest.mark.parametrize(
-    "text",
-    [
-        "Vehicles move in water_velocity under a control law.", "There is no obstacle.", "Is there a way to stop?",
-        "Vehicles whose goals lie in sea water drift.",
-        "Of course, the collision course is stable.", "It is no longer needed; it is no faster than NumPy.",
-        "Contact the maintainers, who are volunteers.", "The way that a policy acts is fixed.",
-        "What is there to see?", "We recommend amendments.", "A force beyond the limit is clipped.",
-        "Who is it for?", "People who train policies start here.",
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("text", [
+    "Vehicles move in water_velocity under a control law.", "There is no obstacle.", "Is there a way to stop?",
+    "Vehicles whose goals lie in sea water drift.",
+    "Of course, the collision course is stable.", "It is no longer needed; it is no faster than NumPy.",
+    "Contact the maintainers, who are volunteers.", "The way that a policy acts is fixed.",
+    "What is there to see?", "We recommend amendments.", "A force beyond the limit is clipped.",
+    "Who is it for?", "People who train policies start here.",
+])  # fmt: skip
 def test_plain_english_is_not_refused(text):
     assert private(text) == []
 
