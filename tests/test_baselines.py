@@ -5,7 +5,6 @@ import json
 import math
 import pickle
 from importlib import resources
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from hypothesis import strategies as st
 from research.episodes import read_rows
 from tests.golden import STARTER
 from tests.nets import ANYWHERE
+from tests.processes import ROOT
 from tests.swarms import fly, piloted
 from uuv_marl import load_scenario, parallel_env, scenario_names
 from uuv_marl.baselines import POLICIES, Policy, PolicyError, make_policy, with_policy_requirements
@@ -157,7 +157,7 @@ def test_slots_are_a_lattice_around_zero(n):
 
 WITH_MEMORY = ["sff", "sdc", "scout", "tangent_bug", "sff,safety_filter=true"]
 FOLDER = resources.files("uuv_marl.baselines") / "tuned"
-TRIED = Path(__file__).resolve().parent.parent / "research" / "tuned"
+TRIED = ROOT / "research" / "tuned"
 
 
 @pytest.mark.parametrize("file", SPACES)

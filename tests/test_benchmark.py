@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from tests.processes import SETS, cli, quick
+from tests.processes import SETS, quick, refused, succeeds
 from tests.swarms import run_of
 from uuv_marl import evaluate, load_scenario
 from uuv_marl.baselines import make_policy, with_policy_requirements
@@ -108,22 +108,19 @@ def test_your_own_policy_stands_in_the_table(tmp_path, monkeypatch):
     (tmp_path / "my_policies.py").write_text(OWN_POLICY)
     monkeypatch.chdir(tmp_path)
     arguments = ["benchmark", "--policy=my_policies:Ahead", "--seeds=2", "--output=out", *SETS]
-    assert cli(*arguments)[0] == 0
+    succeeds(*arguments)
     assert "my_policies:Ahead" in (tmp_path / "out" / "table.md").read_text()
     for trace in (tmp_path / "out" / "traces").glob("*.1.npz"):
         trace.unlink()
-    assert cli(*arguments)[0] == 0  # a run without its trace is run again
+    succeeds(*arguments)  # a run without its trace is run again
     (tmp_path / "my_policies.py").write_text(OWN_POLICY + "\n# changed\n")
-    status, text = cli(*arguments)
-    assert status == 2
-    assert "before its file changed" in text
+    refused("before its file changed", *arguments)
 
 
 def test_the_command_line_from_end_to_end(tmp_path):
     arguments = ["benchmark", "--scenario=lossy", "--scenario=tracking", "--policy=bio_inspired", "--policy=random"]
     arguments += ["--seeds=3", f"--output={tmp_path}", *SETS, "--set=losses.times_s=[1.0, 2.0]"]
-    status, text = cli(*arguments)
-    assert status == 0, text
+    text = succeeds(*arguments)
     assert "bio_inspired" in text
     assert "[s]" in text  # brackets are not markup
     data = json.loads((tmp_path / "results.json").read_text())
@@ -138,14 +135,14 @@ def test_the_command_line_from_end_to_end(tmp_path):
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in (tmp_path / "figures").iterdir())
     assert "| policy |" in (tmp_path / "table.md").read_text()
     before = (tmp_path / "results.json").read_bytes()
-    assert cli(*arguments)[0] == 0
+    succeeds(*arguments)
     assert (tmp_path / "results.json").read_bytes() == before
 
 
 @pytest.mark.parametrize("name", ["bio_inspired", "scout", "mappo", "idle"])
 def test_the_parameters_listed_are_those_that_a_policy_s_name_takes(name):
-    text = cli("list", "policies", f"--show={name}")[1]
-    listed = set(text.partition("Parameters: ")[2].split(", ")) - {"safety_filter", "own_clock"}
+    shown = succeeds("list", "policies", f"--show={name}").partition("Parameters: ")[2]
+    listed = set(shown.split(", ")) - {"safety_filter", "own_clock"}
     scenario = with_policy_requirements(name, load_scenario("tracking"))
     with pytest.raises(PolicyError, match="has no parameter") as error:
         make_policy(f"{name},nothing=1", scenario)
@@ -169,9 +166,7 @@ def test_the_parameters_listed_are_those_that_a_policy_s_name_takes(name):
     (["tune", "--policy=idle"], "no free gains"),
 ])  # fmt: skip
 def test_mistakes_are_explained_without_a_traceback(arguments, message, tmp_path):
-    status, text = cli(*arguments, *([f"--output={tmp_path}"] if arguments[0] != "list" else []))
-    assert status == 2
-    assert message in text
+    text = refused(message, *arguments, *([f"--output={tmp_path}"] if arguments[0] != "list" else []))
     assert "Traceback" not in text
 
 

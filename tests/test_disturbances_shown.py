@@ -1,15 +1,12 @@
 """Disturbances as users see them: velocities over ground, pictures and replays of the current, and headers."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tests.golden import STARTER
 from tests.oracle import sonar
 from tests.swarms import run_of, started
-from tests.test_replay_page import node
+from tests.test_replay_page import page_numbers
 from uuv_marl import load_scenario
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.percept import Percept
@@ -78,8 +75,7 @@ def test_a_recording_tells_the_water_at_every_vehicle(sailed):
 def test_the_page_reads_the_same_water(sailed, tmp_path):
     write_page([sailed], tmp_path / "page.html")
     times = (0.0, 2.0, 5.0)
-    read = json.loads(node(Path(__file__).parent / "page_numbers.mjs", tmp_path / "page.html", *times))
-    for time, numbers in zip(times, read["numbers"][0], strict=True):
+    for time, numbers in zip(times, page_numbers(tmp_path / "page.html", *times)[0], strict=True):
         centre = np.array(numbers["poses"]).reshape(-1, 3)[:, :2]
         ours = Scenes(sailed).at(time).water.at(centre)
         np.testing.assert_allclose(numbers["flow"], ours, atol=CODINGS["drift"].resolution + 1e-4)

@@ -6,7 +6,6 @@ import re
 import sys
 import warnings
 from fnmatch import fnmatch
-from pathlib import Path
 from types import ModuleType
 from typing import Literal, get_args, get_origin
 
@@ -15,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from research.episodes import measured, read_rows, select
-from tests.processes import module_of
+from tests.processes import ROOT, module_of
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
 from uuv_marl.cli import app
@@ -24,7 +23,6 @@ from uuv_marl.tasks import TASKS
 from uuv_marl.tasks.maps.kinds import KINDS
 
 pytestmark = pytest.mark.docs
-ROOT = Path(__file__).resolve().parent.parent
 README, CONTRIBUTING, INDEX = ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs" / "README.md"
 POLICY = [ROOT / name for name in ("SECURITY.md",)]
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.py"))

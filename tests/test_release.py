@@ -7,12 +7,12 @@ tested in test_setup.py, with every run.
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
+from tests.processes import ROOT
+
 pytestmark = [pytest.mark.release, pytest.mark.needs("build")]
-ROOT = Path(__file__).resolve().parent.parent
 
 
 def run(*command, **options):

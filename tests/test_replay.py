@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tests.processes import SETS, cli, quick
+from tests.processes import SETS, cli, quick, refused, succeeds
 from tests.swarms import piloted, run_of
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.results import Results
@@ -174,9 +174,15 @@ def test_a_browser_reads_the_recording(tmp_path):
         assert ("detected_index" in arrays) == bool(inspected)
 
 
+OWN = "from uuv_marl.baselines.random_idle import Random\n\n\nclass Mine(Random):\n    pass\n"
+
+
 @pytest.fixture
-def written(monkeypatch):
-    """What the command gave to the writers of pages and films."""
+def written(tmp_path, monkeypatch):
+    """What the command, in a folder with a user's policy, gave to the writers of pages and films."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    Path("own.py").write_text(OWN)
     calls = []
 
     def write(recordings, path, **options):
@@ -192,13 +198,11 @@ def written(monkeypatch):
     return calls
 
 
-replay = partial(cli, "replay")
+replay = partial(succeeds, "replay")
 
 
-def test_the_command_shows_policies_side_by_side(tmp_path, monkeypatch, written):
-    monkeypatch.chdir(tmp_path)
-    code, text = replay("--policy=idle", "--policy=sdc", "--policy=idle", "--seed=3", "--inspect=2", *SETS)
-    assert code == 0, text
+def test_the_command_shows_policies_side_by_side(written):
+    text = replay("--policy=idle", "--policy=sdc", "--policy=idle", "--seed=3", "--inspect=2", *SETS)
     ((recordings, path, _),) = written
     assert [(recording.policy, recording.seed) for recording in recordings] == [("idle", 3), ("sdc", 3)]
     assert [list(recording.inspections) for recording in recordings] == [[2], [2]]
@@ -208,31 +212,26 @@ def test_the_command_shows_policies_side_by_side(tmp_path, monkeypatch, written)
     assert f"Replay: {path}" in text
 
 
-def test_the_command_shows_the_runs_of_a_benchmark(tmp_path, monkeypatch, written):
-    monkeypatch.chdir(tmp_path)
+def test_the_command_shows_the_runs_of_a_benchmark(written):
     scenario = quick("lossy", **{"losses.times_s": [2.0]})
     results = Results("out", [scenario])
     runner.run_missing(results, [scenario], ["idle", "random"], [0, 1], lambda *a: None)
     for arguments in ([], ["--scenario=lossy", "--seed=1", "--inspect=0"]):
-        code, text = replay("out", "--policy=random", "--policy=idle", "--output=below/x.GIF", *arguments)
-        assert code == 0, text
+        replay("out", "--policy=random", "--policy=idle", "--output=below/x.GIF", *arguments)
         recordings, path, _ = written[-1]
         assert path == Path("below/x.GIF")
         assert [one.metrics for one in recordings] == [
             row.metrics for name in ("random", "idle") for row in results.select("lossy", name, [recordings[0].seed])
         ]
     assert recordings[0].seed == 1
-    assert replay("out")[0] == 0
+    replay("out")
     assert [one.policy for one in written[-1][0]] == ["idle", "random"]
-    assert "holds no 'starter' but lossy; choose with --scenario" in replay("out", "--scenario=starter")[1]
+    refused("holds no 'starter' but lossy; choose with --scenario", "replay", "out", "--scenario=starter")
 
 
-def test_a_page_s_name_tells_changes_apart(tmp_path, monkeypatch, written):
-    monkeypatch.chdir(tmp_path)
-    Path("own.py").write_text("from uuv_marl.baselines.random_idle import Random\n\n\nclass Mine(Random):\n    pass\n")
-    monkeypatch.setattr(sys, "path", list(sys.path))
+def test_a_page_s_name_tells_changes_apart(written):
     for changes in (SETS, [*SETS, "--set=timing.decision_period_s=0.5"]):
-        assert replay("--policy=own:Mine", *changes)[0] == 0
+        replay("--policy=own:Mine", *changes)
     names = [path.name for _, path, _ in written]
     assert len(set(names)) == 2
     assert all(re.fullmatch(r"single_obstacle\.own_Mine\.0\.[0-9a-f]{8}\.html", name) for name in names)
@@ -248,42 +247,35 @@ def test_a_page_s_name_tells_changes_apart(tmp_path, monkeypatch, written):
     (["--set=sonar.channels=[]"], "every policy has its own"),
     (["nowhere"], "nowhere/results.json can't be read (No such file or directory); give the folder of a benchmark"),
 ])  # fmt: skip
-def test_mistakes_are_explained_before_anything_is_simulated(arguments, message, tmp_path, monkeypatch, written):
-    monkeypatch.chdir(tmp_path)
+def test_mistakes_are_explained_before_anything_is_simulated(arguments, message, monkeypatch, written):
     Path("folder.html").mkdir()
     monkeypatch.setattr("uuv_marl.replay.record.record", lambda *a: pytest.fail("simulated"))
     own = arguments[0].startswith("nowhere") or any("num_vehicles" in argument for argument in arguments)
-    code, text = replay(*([] if own else SETS), *arguments)
-    assert code == 2, text
-    assert message in text
+    refused(message, "replay", *([] if own else SETS), *arguments)
     assert not written
 
 
-def test_stopping_writes_nothing(tmp_path, monkeypatch, written):
+def test_stopping_writes_nothing(monkeypatch, written):
     def stop(*arguments):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("uuv_marl.replay.record.record", stop)
-    monkeypatch.chdir(tmp_path)
-    code, text = replay()
-    assert code == 130
+    status, text = cli("replay")
+    assert status == 130
     assert text.endswith("Stopped; nothing was written.")
-    assert not list(tmp_path.iterdir())
+    assert list(Path().iterdir()) == [Path("own.py")]
 
 
-def test_the_benchmark_ends_with_the_command_that_shows_its_worst_seed(tmp_path, monkeypatch, written):
-    monkeypatch.chdir(tmp_path)
+def test_the_benchmark_ends_with_the_command_that_shows_its_worst_seed(written):
     Path("my waters").mkdir()
     Path("my waters", "mine.toml").write_text('title = "Mine"\nsource = "own"\nextends = "single_obstacle"\n')
-    Path("own.py").write_text("from uuv_marl.baselines.random_idle import Random\n\n\nclass Mine(Random):\n    pass\n")
-    monkeypatch.setattr(sys, "path", list(sys.path))
     arguments = ["--scenario=my waters/mine.toml", "--scenario=tracking", "--policy=own:Mine", "--seeds=2", *SETS]
     close = "--set=constraints.s_u_m=30.0"
     done = CliRunner().invoke(app, ["benchmark", *arguments, close, "--output=out"])
     assert done.exit_code == 0, done.output
     (printed,) = re.findall(r"^ *uuv-marl (replay .*)$", done.output, flags=re.M)
     rows = [runner.ResultRow(**run) for run in json.loads(Path("out/results.json").read_text())["runs"]]
-    assert cli(*shlex.split(printed))[0] == 0
+    succeeds(*shlex.split(printed))
     ((recordings, _, _),) = written
     shown = recordings[0]
     (same,) = [r for r in rows if r[:3] == (shown.scenario.name, shown.policy, shown.seed)]

@@ -319,7 +319,7 @@ for what in ('scenarios', 'policies'): assert CliRunner().invoke(app, ['list', w
     (LIST_ALL, {"matplotlib", "scipy.stats"}),
 ], ids=["import", "load_scenario", "uuv-marl list"])  # fmt: skip
 def test_light_work_imports_nothing_heavy(code, heavy):
-    python(f"{code}\nimport sys; assert not {heavy!r} & set(sys.modules)")
+    python("-c", f"{code}\nimport sys; assert not {heavy!r} & set(sys.modules)")
 
 
 def test_a_scenario_names_its_vehicle_whose_numbers_stand_in_a_file(tmp_path):

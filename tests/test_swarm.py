@@ -49,7 +49,7 @@ def test_threads_do_not_change_a_run(monkeypatch):
 @pytest.mark.parametrize("layer", ["omp", "workqueue"])
 def test_several_threads_step_batches_at_once(layer):
     """Numba's own threads would abort the process here, with its threading layer without OpenMP."""
-    assert python(AT_ONCE, NUMBA_THREADING_LAYER=layer, NUMBA_NUM_THREADS="2") == "True\n"
+    assert python("-c", AT_ONCE, NUMBA_THREADING_LAYER=layer, NUMBA_NUM_THREADS="2") == "True\n"
 
 
 AT_ONCE = """
@@ -103,7 +103,7 @@ print(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
 
 
 def test_after_a_fork_a_batch_runs_with_threads_of_its_own():
-    assert python(FORKED) == "7\n"
+    assert python("-c", FORKED) == "7\n"
 
 
 def test_inactive_worlds_stay_unchanged():

@@ -3,13 +3,12 @@
 import json
 import re
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import uuv_marl
-from tests.processes import cli, python
+from tests.processes import ROOT, python, succeeds
 from tests.swarms import run_of, started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import with_policy_requirements
@@ -24,8 +23,6 @@ from uuv_marl.tasks import Follow, Task
 from uuv_marl.tasks.measures import MEASURED
 
 EXAMPLE = "examples.extending.task:Rendezvous"
-
-
 DRAWS = """
 import hashlib, uuv_marl
 for name in ("few_informed", "hard_water", "two_swarms", "silent_targets", "random_field"):
@@ -38,7 +35,7 @@ for name in ("few_informed", "hard_water", "two_swarms", "silent_targets", "rand
 def test_draws_do_not_depend_on_the_processor_s_own_instructions():
     """Matrix products, and NumPy's functions, are other code on processors without them."""
     older = {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
-    now, before = (python(DRAWS, PYTHONWARNINGS="ignore", **more) for more in ({}, older))
+    now, before = (python("-c", DRAWS, PYTHONWARNINGS="ignore", **more) for more in ({}, older))
     assert len(now.splitlines()) == 5
     assert now == before
 
@@ -272,7 +269,7 @@ def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():
 
 @pytest.fixture
 def in_example_folder(monkeypatch):
-    monkeypatch.chdir(Path(__file__).resolve().parent.parent / "examples" / "extending")
+    monkeypatch.chdir(ROOT / "examples" / "extending")
     monkeypatch.setattr(sys, "path", [*sys.path])
     yield
     sys.modules.pop("task", None)
@@ -280,7 +277,7 @@ def in_example_folder(monkeypatch):
 
 def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path, in_example_folder):
     how = ["--scenario", "starter", "--set", "task=task:Rendezvous", "--policy", "random"]
-    assert cli("benchmark", *how, "--seeds", 2, "--output", tmp_path / "out")[0] == 0
+    succeeds("benchmark", *how, "--seeds", 2, "--output", tmp_path / "out")
     runs = json.loads((tmp_path / "out" / "results.json").read_text())["runs"]
     assert all(set(run["metrics"]["task"]) == {"success_share", "swarm_success", "spread_m"} for run in runs)
     text = (tmp_path / "out" / "table.md").read_text()
@@ -290,7 +287,7 @@ def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path,
     np.testing.assert_array_equal(frame["spread_m"], [run["metrics"]["task"]["spread_m"] for run in runs])
     assert {*frame.columns} <= {"spread_m", "success_share", "swarm_success", *MEASURED}
     assert _outcome(runs[0]["metrics"]).startswith("success 0%, ")
-    assert cli("replay", *how, "--output", tmp_path / "replay.html")[0] == 0
+    succeeds("replay", *how, "--output", tmp_path / "replay.html")
     assert (tmp_path / "replay.html").stat().st_size > 10_000
 
 

@@ -21,7 +21,7 @@ import safetensors.numpy
 import torch
 
 from tests.nets import card_for, tensors
-from tests.processes import cli
+from tests.processes import cli, refused, succeeds
 from uuv_marl import evaluate, load_scenario
 from uuv_marl.baselines import make_policy
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
@@ -963,8 +963,7 @@ def test_the_command_says_what_to_train_and_can_be_stopped(tmp_path, monkeypatch
     monkeypatch.setattr(trainings, "train", fake)
     command = ["train", "hard_water", "--steps=1e3", "--seed=3", f"--output={tmp_path}", "--set=network.memory=true"]
     command += ["--set=sizes=[5,20]", "--set=ppo.noise=[0.3, 0.1]", "--set=sonar.echo_reports=centre"]
-    status, output = cli(*command)
-    assert status == 0, output
+    output = succeeds(*command)
     assert "swarm success 75%, vehicles 90%, collisions 0.5 per episode, time 30 s" in output
     assert "250 agent-steps/s" in output
     assert calls == [
@@ -983,15 +982,13 @@ def test_the_command_says_what_to_train_and_can_be_stopped(tmp_path, monkeypatch
 
 def test_the_command_goes_on_with_what_the_folder_holds(tmp_path, no_validation):
     list(train(tmp_path, small(steps=168)))
-    status, output = cli("train", "hard_water", "--resume", f"--output={tmp_path}")
-    assert status == 2
-    assert "continues the training in the folder; leave out the scenario" in output
-    status, output = cli("train", "--resume", f"--output={tmp_path}", "--steps=336")
-    assert status == 0, output
+    here = "train", "--resume", f"--output={tmp_path}"
+    refused("continues the training in the folder; leave out the scenario", *here, "hard_water")
+    output = succeeds(*here, "--steps=336")
     assert "Best validation: swarm success" in output
     assert f"uuv-marl replay --scenario starter --policy {tmp_path}/best --seed 900000" in output
     assert [row["agent_steps"] for row in rows(tmp_path)] == ["168", "336"]
-    assert "the budget was already spent" in cli("train", "--resume", f"--output={tmp_path}")[1]
+    assert "the budget was already spent" in cli(*here)[1]
 
 
 @pytest.mark.parametrize(("options", "message"), [
@@ -1000,9 +997,7 @@ def test_the_command_goes_on_with_what_the_folder_holds(tmp_path, no_validation)
     (["nowhere.toml"], "nowhere.toml can't be read"),
 ])  # fmt: skip
 def test_options_that_cannot_work_are_explained(options, message, tmp_path):
-    status, output = cli("train", f"--output={tmp_path / 'a'}", *options)
-    assert status == 2
-    assert message in output
+    refused(message, "train", f"--output={tmp_path / 'a'}", *options)
     assert not (tmp_path / "a" / "config.json").exists()
 
 
