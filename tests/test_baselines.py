@@ -24,6 +24,9 @@ from uuv_marl.benchmark.tuning import OBJECTIVES, SPACES, TRIALS
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 
+WITH_MEMORY = ["sff", "sdc", "scout", "tangent_bug", "sff,safety_filter=true"]
+FOLDER = resources.files("uuv_marl.baselines") / "tuned"
+TRIED = ROOT / "research" / "tuned"
 GAINS = bio_inspired.BioInspiredGains()
 
 
@@ -155,11 +158,6 @@ def test_slots_are_a_lattice_around_zero(n):
         np.testing.assert_allclose(away.min(axis=1), sdc.SLOT_PITCH_M)
 
 
-WITH_MEMORY = ["sff", "sdc", "scout", "tangent_bug", "sff,safety_filter=true"]
-FOLDER = resources.files("uuv_marl.baselines") / "tuned"
-TRIED = ROOT / "research" / "tuned"
-
-
 @pytest.mark.parametrize("file", SPACES)
 def test_tuned_gains_come_from_shipped_trials(file):
     data = json.loads((FOLDER / f"{file}.json").read_text())
@@ -257,15 +255,18 @@ def test_a_remedy_is_one_that_helps():
         make_policy("sdc", fixed)
 
 
-class Nothing(Policy):
-    """Decides nothing."""
+class Acts(Policy):
+    """Has another's method, and not its own."""
+
+    def act(self, percept):
+        return np.zeros((*percept.flat.shape[:2], 2), np.float32)
 
 
 @pytest.mark.parametrize(("name", "message"), [
     ("sff", "link .sonar.channels.*use an environment's for_policy, with_policy_requirements"),
     ("sdc", "compass and link and identity .sonar.channels.*use an environment.s for_policy, with_policy"),
     ("bio_inspired_plus", "yaw damping of 600 .*actuators.yaw_damping_nms.*with_policy_requirements"),
-    ("tests.test_baselines:Nothing", r"policy '.*Nothing' must define decide\(percept\)"),
+    ("tests.test_baselines:Acts", r"policy '.*Acts' must define decide\(percept\), and leave act, .* alone"),
     ("bio_inspired,zeta_m=1", "has no parameter 'zeta_m'; did you mean 'zeta_"),
     ("bio_inspired,zeta_n=x", "the gain zeta_n must be a finite number, got 'x'"),
     ("bio_inspired,zeta_n=nan", "the gain zeta_n must be a finite number, got nan"),

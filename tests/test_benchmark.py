@@ -160,6 +160,9 @@ def test_the_parameters_listed_are_those_that_a_policy_s_name_takes(name):
     (["benchmark", "--policy=math:pi"], "must be a subclass"),
     (["benchmark", "--set=name=../up"], "name must hold letters"),
     (["benchmark", "--set=seed=1", "--set=seed=2"], "--set seed is given twice, as 1 and as 2; leave one out"),
+    (["train", "--steps=3.5"], "'3.5' is not a whole number from 1 on"),
+    (["train", "nowhere"], "scenario 'nowhere'"),
+    (["train", "nowhere.toml"], "nowhere.toml can't be read"),
     (["train", "starter", "--seed=1", "--set=seed=2"], "--seed and --set seed are both given; leave one out"),
     (["robustness", "--scenario=hard_water"], "has the task 'hard_water', and the suite scores 'follow' alone"),
     (["robustness", "--axis=X", "--level=2"], "axis X has the levels 1, "),
@@ -168,6 +171,7 @@ def test_the_parameters_listed_are_those_that_a_policy_s_name_takes(name):
 def test_mistakes_are_explained_without_a_traceback(arguments, message, tmp_path):
     text = refused(message, *arguments, *([f"--output={tmp_path}"] if arguments[0] != "list" else []))
     assert "Traceback" not in text
+    assert {path.name for path in tmp_path.iterdir()} <= {".lock"}
 
 
 def test_between_walls_tuning_pays_for_who_arrives_untouched_and_for_time():

