@@ -16,6 +16,8 @@ from uuv_marl.replay.record import record
 from uuv_marl.replay.scenes import Scenes
 
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
+WATER = CURRENT | {"current.variation_mps": 0.3, "current.eddies": 8, "current.eddy_speed_mps": 1.2}
+SHORT = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0}
 FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])
 """North and east [m/s]."""
 
@@ -49,10 +51,6 @@ def test_the_global_state_holds_the_velocity_over_ground():
     flow = sonar.to_body(FLOW[None], moved.heading[0])
     np.testing.assert_allclose(fields[1]["velocity"] - fields[0]["velocity"], flow, atol=1e-5)
     np.testing.assert_array_equal(fields[1]["yaw_rate"], fields[0]["yaw_rate"])
-
-
-WATER = CURRENT | {"current.variation_mps": 0.3, "current.eddies": 8, "current.eddy_speed_mps": 1.2}
-SHORT = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0}
 
 
 @pytest.fixture(scope="module")

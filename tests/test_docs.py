@@ -115,12 +115,9 @@ def stop_at_once(*args, **kwargs):
 def test_commands_are_understood(line, monkeypatch, tmp_path):
     """Parsed as written, options and names checked, then stopped before the long work."""
     for work in (
-        "benchmark.runner.run_missing",
-        "benchmark.tuning.tune",
-        "benchmark.robustness.job.run",
-        "replay.record.record",
-        "benchmark.results.read_content",
-    ):
+        "benchmark.runner.run_missing", "benchmark.tuning.tune", "benchmark.robustness.job.run",
+        "replay.record.record", "benchmark.results.read_content",
+    ):  # fmt: skip
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
     for work in ("paper.reproduce.make", "dynamics.__main__.identify", "heldout.__main__.run", "verify.check.check"):
         monkeypatch.setattr(f"research.{work}", stop)

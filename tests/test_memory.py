@@ -13,15 +13,11 @@ from uuv_marl.baselines.memory.neighbours import age_of
 from uuv_marl.baselines.memory.response import follow, remains
 from uuv_marl.baselines.memory.surroundings import uncertainty
 
+DISCS = ((260.0, 190.0, 15.0), (330.0, 270.0, 25.0), (430.0, 330.0, 10.0))
 COURSE = {
-    "trajectory.waypoints_m": [[150.0, 150.0], [450.0, 250.0], [350.0, 450.0]],
-    "obstacles": [
-        {"centre_m": [260.0, 190.0], "radius_m": 15.0},
-        {"centre_m": [330.0, 270.0], "radius_m": 25.0},
-        {"centre_m": [430.0, 330.0], "radius_m": 10.0},
-    ],
-    "swarm.num_vehicles": 12,
-}
+    "trajectory.waypoints_m": [[150.0, 150.0], [450.0, 250.0], [350.0, 450.0]], "swarm.num_vehicles": 12,
+    "obstacles": [{"centre_m": [x, y], "radius_m": radius} for x, y, radius in DISCS],
+}  # fmt: skip
 """Two legs, obstacles beside them, and rest."""
 SURFACE = {"sonar.echo_reports": "surface"}
 NOISE = {"noise.bearing_deg": 2.0, "noise.range_share": 0.02}

@@ -15,6 +15,8 @@ from uuv_marl.scenario import disturbances
 
 DOCS = ROOT / "docs"
 PLACES = [(axis.name, level) for axis in AXES.values() for level in axis.levels]
+TINY = job.Plan(("A1", "C1"), (1, 5), ("starter",), ("bio_inspired",), 1)
+UNLIKE = ("S2", "S3", "S4", "S5", "S7", "S8", "F1", "X", "C1")
 pytestmark = pytest.mark.needs("pandas")
 
 
@@ -80,9 +82,6 @@ def test_a_group_of_which_every_seed_misses_a_cell_has_no_score():
     assert scores.group_score(half, scores.EVERY) is None
 
 
-TINY = job.Plan(("A1", "C1"), (1, 5), ("starter",), ("bio_inspired",), 1)
-
-
 def test_a_cell_that_is_done_is_not_run_again(tmp_path, monkeypatch):
     asked = []
 
@@ -120,9 +119,6 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
 @pytest.mark.docs
 def test_the_shipped_page_is_made_of_the_shipped_episodes():
     assert (DOCS / "robustness.md").read_text() == page.report(job.read_episodes(DOCS / "robustness.csv.gz"))
-
-
-UNLIKE = ("S2", "S3", "S4", "S5", "S7", "S8", "F1", "X", "C1")
 
 
 @pytest.mark.parametrize("name", [name for name in AXES if name not in UNLIKE])

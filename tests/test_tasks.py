@@ -9,7 +9,7 @@ import pytest
 
 import uuv_marl
 from tests.processes import ROOT, python, succeeds
-from tests.swarms import run_of, started
+from tests.swarms import batched, run_of, started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import episodes
@@ -91,13 +91,9 @@ class TwoWays(Survive):
 
     def draw(self, world, rng):
         drawn = default_setup(self.swarm.scenario, rng)
-        n = len(drawn.eta)
-        return drawn._replace(
-            waypoints=(drawn.waypoints[0], drawn.waypoints[0] * [1.0, -1.0]),
-            times=2 * drawn.times,
-            group=(np.arange(n) % 2).astype(np.int64),
-            informed=np.arange(n) > 1,
-        )
+        rank, way = np.arange(len(drawn.eta)), drawn.waypoints[0]
+        mirrored = {"waypoints": (way, way * [1.0, -1.0]), "times": 2 * drawn.times}
+        return drawn._replace(group=(rank % 2).astype(np.int64), informed=rank > 1, **mirrored)
 
 
 class Endless(Survive):
@@ -149,8 +145,7 @@ def test_an_arrival_of_groups_is_that_of_all():
 
 
 def test_at_a_goal_at_rest_who_touched_something_has_failed():
-    batch = BatchedEnv(load_scenario("starter", overrides={"task": {"name": "reach", "near_m": 30.0}}))
-    batch.reset(0)
+    batch = batched("starter", {"task": {"name": "reach", "near_m": 30.0}})
     swarm, goal = batch.swarm, batch.swarm.world_map.waypoints[0, 0, -1]
     assert (swarm.facts.reference[0, 0] == [*goal, 0.0, 0.0]).all()
     swarm.state.eta[0, :, :2] = goal + 7.0 * np.stack([np.arange(5), np.zeros(5)], axis=1)
@@ -221,9 +216,8 @@ def test_numbers_that_a_task_needs_are_missed_when_a_swarm_is_made():
 
 
 def test_a_reward_that_a_task_does_not_know_or_does_not_give_is_refused():
-    with pytest.raises(
-        ValueError, match="reward must be 'dense', 'first_arrival', 'team' or a function of the swarm, got 'sparse'"
-    ):
+    message = "reward must be 'dense', 'first_arrival', 'team' or a function of the swarm, got 'sparse'"
+    with pytest.raises(ValueError, match=message):
         uuv_marl.parallel_env("starter", task="reach", reward="sparse")
     env = uuv_marl.parallel_env("starter", task=f"{__name__}:Broken")
     env.reset(seed=0)
@@ -242,9 +236,7 @@ class Still(Follow):
 
 
 def test_a_subclass_of_follow_may_have_its_own_reward():
-    batch, usual = (BatchedEnv(load_scenario("starter", overrides=own)) for own in ({"task": f"{__name__}:Still"}, {}))
-    for env in (batch, usual):
-        env.reset(0)
+    batch, usual = (batched("starter", own) for own in ({"task": f"{__name__}:Still"}, {}))
     result, expected = (env.step(np.ones((1, 5, 2))) for env in (batch, usual))
     np.testing.assert_array_equal(result.terms["tracking"], expected.terms["tracking"])
     np.testing.assert_array_equal(result.reward, sum(result.terms.values()))
