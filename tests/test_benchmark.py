@@ -169,6 +169,8 @@ def test_the_parameters_listed_are_those_that_a_policy_s_name_takes(name):
     (["tune", "--policy=idle"], "no free gains"),
 ])  # fmt: skip
 def test_mistakes_are_explained_without_a_traceback(arguments, message, tmp_path):
+    if arguments[0] == "train":
+        pytest.importorskip("torch")
     text = refused(message, *arguments, *([f"--output={tmp_path}"] if arguments[0] != "list" else []))
     assert "Traceback" not in text
     assert {path.name for path in tmp_path.iterdir()} <= {".lock"}
