@@ -7,22 +7,14 @@ import numpy as np
 import uuv_marl
 
 WORLDS, VEHICLES, SEED = 3, 4, 20
-ARRIVES = {
-    "trajectory.speed_mps": 40.0,
-    "arrival.radius_m": 5000.0,
-    "arrival.spread_m": 20000.0,
-    "arrival.dwell_s": 0.2,
-}
+ARRIVES = {"trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4, "arrival.dwell_s": 0.2}
 LOSES = {"losses.times_s": [1.0, 2.0]}
 TIMES_OUT = {"time_limit.factor": 0.02, "time_limit.extra_s": 8.0}
-SINKS = {
-    **LOSES,
-    "time_limit.extra_s": 40.0,
-    "collision.ends_vehicle": True,
-    "collision.hull_radius_m": 22.0,
-    "start.spacing_m": 45.0,
-    "start.gap_m": 45.0,
-}
+WIDE = {
+    **LOSES, "time_limit.extra_s": 40.0, "collision.hull_radius_m": 22.0, "start.spacing_m": 45.0, "start.gap_m": 45.0,
+}  # fmt: skip
+"""Vehicles so wide that they soon collide."""
+SINKS = {**WIDE, "collision.ends_vehicle": True}
 MEDIUM = {
     "current.speed_mps": 0.5, "current.variation_mps": 0.2, "current.eddies": 4, "current.eddy_speed_mps": 0.5,
     "latency.travel_time": True, "latency.processing_s": 0.3, "latency.compensated": True,
@@ -40,8 +32,6 @@ SEA = MEDIUM | {"sonar.channels": ["compass", "current", "age", "ranged", "modem
 """The same, and all that vehicles can be told of it."""
 SINKING = {"faults": [{"kind": "member", "share": 0.4, "onset_s": 2.0}]}
 BRIEF = {"time_limit.factor": 0.005, "time_limit.extra_s": 4.0}
-
-
 OWN_TASK = "examples.extending.task:Rendezvous"
 
 
@@ -57,13 +47,9 @@ class Case(NamedTuple):
 
     @property
     def kwargs(self):
-        return {
-            "scenario": self.scenario,
-            "num_vehicles": VEHICLES,
-            "decision_period": self.period,
-            "overrides": {**(LOSES if self.scenario == "lossy" else {}), **self.overrides},
-            **self.options,
-        }
+        overrides = {**(LOSES if self.scenario == "lossy" else {}), **self.overrides}
+        own = {"scenario": self.scenario, "decision_period": self.period, "overrides": overrides}
+        return {"num_vehicles": VEHICLES, **own, **self.options}
 
     def actions(self):
         """Shape (step, world, vehicle, 2)."""

@@ -3,6 +3,7 @@
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.benchmark.evaluate import episodes
+from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.sim.swarm import Swarm
 
 
@@ -11,6 +12,13 @@ def started(scenario, overrides=None, worlds=1, seed=0, n=None):
     swarm = Swarm(load_scenario(scenario, num_vehicles=n, overrides=overrides), worlds)
     swarm.reset(seed)
     return swarm
+
+
+def batched(scenario, overrides=None, worlds=1, seed=0, n=None, reward="dense"):
+    """Environments stepped together, after their reset."""
+    batch = BatchedEnv(load_scenario(scenario, num_vehicles=n, overrides=overrides), worlds, reward)
+    batch.reset(seed)
+    return batch
 
 
 def piloted(name, scenario, overrides=None, worlds=1, seed=0, n=None, **parameters):

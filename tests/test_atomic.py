@@ -3,11 +3,10 @@
 import errno
 import multiprocessing
 import os
-import subprocess
-import sys
 
 import pytest
 
+from tests.processes import ran
 from uuv_marl.atomic import locked, replacing, write_text
 from uuv_marl.errors import MissingExtraError, ResultsError
 from uuv_marl.extras import extra
@@ -88,19 +87,15 @@ def test_a_missing_library_names_its_extra():
         import uuv_marl.nothing  # noqa: F401
 
 
-@pytest.mark.parametrize(
-    ("module", "library", "name"),
-    [
-        ("envs.sb3", "stable_baselines3", "sb3"),
-        ("envs.torchrl", "torchrl", "torchrl"),
-        ("envs.benchmarl", "benchmarl", "benchmarl"),
-        ("envs.rllib", "ray", "distributed"),
-    ],
-)
+@pytest.mark.parametrize(("module", "library", "name"), [
+    ("envs.sb3", "stable_baselines3", "sb3"),
+    ("envs.torchrl", "torchrl", "torchrl"),
+    ("envs.benchmarl", "benchmarl", "benchmarl"),
+    ("envs.rllib", "ray", "distributed"),
+])  # fmt: skip
 def test_modules_of_optional_libraries_name_their_extra(module, library, name):
     code = f"import sys; sys.modules[{library!r}] = None; import uuv_marl.{module}"
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)
-    assert f"pip install 'uuv_marl[{name}]'" in done.stderr
+    assert f"pip install 'uuv_marl[{name}]'" in ran("-c", code).stderr
 
 
 def test_a_folder_in_which_nothing_was_written_goes_again(tmp_path):

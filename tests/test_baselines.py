@@ -5,7 +5,6 @@ import json
 import math
 import pickle
 from importlib import resources
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from hypothesis import strategies as st
 from research.episodes import read_rows
 from tests.golden import STARTER
 from tests.nets import ANYWHERE
+from tests.processes import ROOT
 from tests.swarms import fly, piloted
 from uuv_marl import load_scenario, parallel_env, scenario_names
 from uuv_marl.baselines import POLICIES, Policy, PolicyError, make_policy, with_policy_requirements
@@ -24,6 +24,9 @@ from uuv_marl.benchmark.tuning import OBJECTIVES, SPACES, TRIALS
 from uuv_marl.percept import Percept, PerceptLayout
 from uuv_marl.sim.swarm import Swarm
 
+WITH_MEMORY = ["sff", "sdc", "scout", "tangent_bug", "sff,safety_filter=true"]
+FOLDER = resources.files("uuv_marl.baselines") / "tuned"
+TRIED = ROOT / "research" / "tuned"
 GAINS = bio_inspired.BioInspiredGains()
 
 
@@ -155,11 +158,6 @@ def test_slots_are_a_lattice_around_zero(n):
         np.testing.assert_allclose(away.min(axis=1), sdc.SLOT_PITCH_M)
 
 
-WITH_MEMORY = ["sff", "sdc", "scout", "tangent_bug", "sff,safety_filter=true"]
-FOLDER = resources.files("uuv_marl.baselines") / "tuned"
-TRIED = Path(__file__).resolve().parent.parent / "research" / "tuned"
-
-
 @pytest.mark.parametrize("file", SPACES)
 def test_tuned_gains_come_from_shipped_trials(file):
     data = json.loads((FOLDER / f"{file}.json").read_text())
@@ -257,28 +255,28 @@ def test_a_remedy_is_one_that_helps():
         make_policy("sdc", fixed)
 
 
-class Nothing(Policy):
-    """Decides nothing."""
+class Acts(Policy):
+    """Has another's method, and not its own."""
+
+    def act(self, percept):
+        return np.zeros((*percept.flat.shape[:2], 2), np.float32)
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("sff", "link .sonar.channels.*use an environment's for_policy, with_policy_requirements"),
-        ("sdc", "compass and link and identity .sonar.channels.*use an environment.s for_policy, with_policy"),
-        ("bio_inspired_plus", "yaw damping of 600 .*actuators.yaw_damping_nms.*with_policy_requirements"),
-        ("tests.test_baselines:Nothing", r"policy '.*Nothing' must define decide\(percept\)"),
-        ("bio_inspired,zeta_m=1", "has no parameter 'zeta_m'; did you mean 'zeta_"),
-        ("bio_inspired,zeta_n=x", "the gain zeta_n must be a finite number, got 'x'"),
-        ("bio_inspired,zeta_n=nan", "the gain zeta_n must be a finite number, got nan"),
-        ("bio_inspired,zeta_n", "'zeta_n' must be key=value"),
-        ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
-        ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, closed, gap, got 'bold'"),
-        ("bio_insp,safety_filter=true", "did you mean 'bio_inspired'"),
-        ("idle,barrier=5,safety_filter=true", "barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"),
-        ("idle,safety_filter=perhaps", "safety_filter must be true or false, got 'perhaps'"),
-    ],
-)
+@pytest.mark.parametrize(("name", "message"), [
+    ("sff", "link .sonar.channels.*use an environment's for_policy, with_policy_requirements"),
+    ("sdc", "compass and link and identity .sonar.channels.*use an environment.s for_policy, with_policy"),
+    ("bio_inspired_plus", "yaw damping of 600 .*actuators.yaw_damping_nms.*with_policy_requirements"),
+    ("tests.test_baselines:Acts", r"policy '.*Acts' must define decide\(percept\), and leave act, .* alone"),
+    ("bio_inspired,zeta_m=1", "has no parameter 'zeta_m'; did you mean 'zeta_"),
+    ("bio_inspired,zeta_n=x", "the gain zeta_n must be a finite number, got 'x'"),
+    ("bio_inspired,zeta_n=nan", "the gain zeta_n must be a finite number, got nan"),
+    ("bio_inspired,zeta_n", "'zeta_n' must be key=value"),
+    ("bio_inspired,obstacle_term=none", "obstacle_term must be 'per_echo' or 'per_obstacle', got 'none'"),
+    ("scout,preset=bold", "preset of scout must be one of base, plus, lead, wary, closed, gap, got 'bold'"),
+    ("bio_insp,safety_filter=true", "did you mean 'bio_inspired'"),
+    ("idle,barrier=5,safety_filter=true", "barrier must be a uuv_marl.baselines.safety.Barrier, got '5'"),
+    ("idle,safety_filter=perhaps", "safety_filter must be true or false, got 'perhaps'"),
+])  # fmt: skip
 def test_a_name_that_means_nothing_is_explained(name, message):
     with pytest.raises(PolicyError, match=message):
         make_policy(name, load_scenario(STARTER))
@@ -294,15 +292,11 @@ def test_what_a_policy_cannot_be_made_for_is_explained():
             make_policy("bio_inspired", *arguments)
 
 
-@pytest.mark.parametrize(
-    ("change", "damping"),
-    [
-        ({}, 600.0),
-        ({"actuators.max_torque_nm": 30.0, "vehicle.N_r": 5.0}, 6.0),
-        ({"actuators.kind": "rudder", "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0}, 0.0),
-    ],
-    ids=["as declared", "a hundredth of the torque", "rudder"],
-)
+@pytest.mark.parametrize(("change", "damping"), [
+    ({}, 600.0),
+    ({"actuators.max_torque_nm": 30.0, "vehicle.N_r": 5.0}, 6.0),
+    ({"actuators.kind": "rudder", "actuators.N_uud": -40.0, "actuators.rudder_max_deg": 20.0}, 0.0),
+], ids=["as declared", "a hundredth of the torque", "rudder"])  # fmt: skip
 @pytest.mark.parametrize("name", ["scout", "mappo"])
 def test_the_inner_loop_is_scaled_with_the_vehicle_s_torque(name, change, damping):
     scenario = with_policy_requirements(name, load_scenario("single_obstacle", num_vehicles=3, overrides=change))

@@ -1,8 +1,6 @@
 """`make test-bounds` finds what it looks for: where Numba is told to, our compiled code checks its indices."""
 
-import os
-import subprocess
-import sys
+from tests.processes import ran
 
 READ = """
 import numpy as np
@@ -23,9 +21,7 @@ for indices in ((0, 1), (0, 7)):
 
 def test_an_index_out_of_bounds_is_an_error_under_the_check(tmp_path):
     (tmp_path / "reads.py").write_text(READ)
-    environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "UUV_MARL_CACHE_DIR": str(tmp_path)}
-    command = [sys.executable, "reads.py"]
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    done = ran("reads.py", folder=tmp_path, NUMBA_BOUNDSCHECK="1", UUV_MARL_CACHE_DIR=str(tmp_path))
     assert done.returncode == 1
     assert "IndexError: index is out of bounds" in done.stderr, "also on a thread that helps"
     assert done.stdout.splitlines() == ["read"]

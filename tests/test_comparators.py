@@ -16,6 +16,7 @@ from uuv_marl.percept import Percept, PerceptLayout
 
 APF = apf.ApfGains(80.0, 40_000.0, 50.0, 500_000.0, 20.0)
 FLOCK = olfati_saber.OlfatiSaberGains(2.0, 14.0, 1.5, 200.0, 2000.0, 3000.0, 40.0, 300.0, 1500.0, 50.0, 400.0)
+SPEEDS = st.floats(-5.0, 5.0)
 METRES = st.floats(-60.0, 60.0)
 
 
@@ -132,9 +133,6 @@ def nearest_approach(p_x, p_y, v_x, v_y, horizon):
     speed2 = v_x * v_x + v_y * v_y
     time = min(max((p_x * v_x + p_y * v_y) / speed2, 0.0), horizon) if speed2 > 0.0 else 0.0
     return math.hypot(p_x - v_x * time, p_y - v_y * time)
-
-
-SPEEDS = st.floats(-5.0, 5.0)
 
 
 @given(METRES, METRES, SPEEDS, SPEEDS, st.floats(2.0, 12.0), st.floats(1.0, 16.0))

@@ -5,8 +5,6 @@ import dis
 import importlib
 import os
 import shutil
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -15,6 +13,7 @@ import numpy as np
 import pytest
 
 import uuv_marl
+from tests.processes import ran
 from tests.swarms import started
 from uuv_marl.sim import compiled, sources
 
@@ -36,9 +35,10 @@ print(now.u[0].hex())
 
 
 def run(folder, cache, **environment):
-    environment = {**os.environ, "PYTHONPATH": str(folder), "UUV_MARL_CACHE_DIR": str(cache), **environment}
-    command = [sys.executable, "-c", MOVE, str(folder)]
-    return subprocess.run(command, capture_output=True, text=True, check=True, env=environment, cwd=folder.parent)
+    environment |= {"PYTHONPATH": str(folder), "UUV_MARL_CACHE_DIR": str(cache)}
+    done = ran("-c", MOVE, folder, folder=folder.parent, **environment)
+    assert done.returncode == 0, done.stderr
+    return done
 
 
 @pytest.fixture
@@ -239,5 +239,4 @@ def test_threads_without_work_sleep():
         "import numba, numpy, uuv_marl; envs = uuv_marl.vector_env(16); envs.reset(seed=0)\n"
         "envs.step(numpy.zeros((16, 54, 2), numpy.float32)); numba.threading_layer()"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "Threading layer is not initialized" in done.stderr, "Numba's threads were started"
+    assert "Threading layer is not initialized" in ran("-c", code).stderr, "Numba's threads were started"

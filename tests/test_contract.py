@@ -1,11 +1,12 @@
 """One contract over every API of the base environment; RLlib's and BenchMARL's own environments run theirs."""
 
+import functools
+
 import pytest
 
 from tests import contract
 
 EVERY = {case.name: case for case in contract.cases()}
-REFERENCE = {}
 
 
 @pytest.fixture(params=EVERY.values(), ids=EVERY.keys())
@@ -13,14 +14,13 @@ def case(request):
     return request.param
 
 
-def reference(case):
-    if case.name not in REFERENCE:
-        REFERENCE[case.name] = contract.parallel(case)
-    return REFERENCE[case.name]
+@functools.cache
+def reference(name):
+    return contract.parallel(EVERY[name])
 
 
 def test_the_cases_show_every_ending(case):
-    run = reference(case)
+    run = reference(case.name)
     assert run.over.any(axis=0).all(), "each world ends at least once"
     if case.overrides is contract.TIMES_OUT:
         assert run.truncated.any()
@@ -35,7 +35,7 @@ def test_the_cases_show_every_ending(case):
 
 @pytest.mark.parametrize("api", ["aec", "vector", pytest.param("torchrl", marks=pytest.mark.needs("torchrl"))])
 def test_every_api_gives_the_same_run(case, api):
-    getattr(contract, api)(case).equals(reference(case))
+    getattr(contract, api)(case).equals(reference(case.name))
 
 
 @pytest.mark.needs("stable_baselines3")
@@ -44,11 +44,11 @@ def test_sb3_gives_the_same_run_or_refuses_losses(case):
         with pytest.raises(ValueError, match="SwarmVecEnv can't represent the loss of a vehicle"):
             contract.sb3(case)
     else:
-        contract.sb3(case).equals(reference(case))
+        contract.sb3(case).equals(reference(case.name))
 
 
 def test_the_comparison_can_fail():
-    run = reference(next(iter(EVERY.values())))
+    run = reference(next(iter(EVERY)))
     for field in run._fields:
         values = getattr(run, field).copy()
         values.flat[-1] = not values.flat[-1] if values.dtype == bool else values.flat[-1] + 0.5

@@ -76,14 +76,11 @@ def test_one_disturbance_changes_no_random_number_of_another(part):
         np.testing.assert_array_equal(*map(attrgetter(f"_disturbances.{table}"), (alone, among)), table)
 
 
-@pytest.mark.parametrize(
-    ("scenario", "overrides", "index", "limits"),
-    [
+@pytest.mark.parametrize(("scenario", "overrides", "index", "limits"), [
         (STARTER, HEARD, "target_index", "-3 and 4"),
         ("silent_targets", {}, "last", "1 and"),
         ("multi_obstacle", TWO, "group", "0 and 1"),
-    ],
-)
+])  # fmt: skip
 def test_a_snapshot_resumes_bit_for_bit_and_has_its_indices_checked(scenario, overrides, index, limits):
     swarm = swim(overrides, scenario=scenario)
     kept, other = swarm.snapshot(), started(swarm.scenario, seed=99)

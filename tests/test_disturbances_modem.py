@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from tests.golden import STARTER
+from tests.nets import saved
 from tests.swarms import fly, piloted, started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import Policy, with_policy_requirements
-from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, card_of, save_checkpoint
-from uuv_marl.baselines.learned.layers import shapes
 from uuv_marl.baselines.requirements import PolicyRequirements
 
 MODEM = {"sonar.channels": ["link", "modem"], "modem.period_s": 2.0, "obstacles": []}
@@ -100,11 +99,8 @@ def test_modem_stands_in_for_the_link_where_a_policy_can_read_either(tmp_path):
     scenario = load_scenario(STARTER, overrides={"sonar.channels": ["link", "modem"]})
     assert with_policy_requirements("sff", scenario).sonar.channels == ("modem",)
     assert with_policy_requirements("tests.test_disturbances_modem:Both", scenario).sonar.channels == ("link", "modem")
-    linked = load_scenario(STARTER, overrides={"sonar.channels": ["link"]})
-    card = card_of(linked)
-    zeros = {name: np.zeros(shape) for name, shape in shapes(card.network, card.sizes).items()}
-    save_checkpoint(tmp_path / WEIGHTS_FILE, card, zeros)
-    assert with_policy_requirements(str(tmp_path), scenario).sonar.channels == ("link",)
+    linked = saved(tmp_path, load_scenario(STARTER, overrides={"sonar.channels": ["link"]}))
+    assert with_policy_requirements(linked, scenario).sonar.channels == ("link",)
 
 
 class Both(Policy):

@@ -1,15 +1,12 @@
 """Disturbances as users see them: velocities over ground, pictures and replays of the current, and headers."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tests.golden import STARTER
 from tests.oracle import sonar
 from tests.swarms import run_of, started
-from tests.test_replay_page import node
+from tests.test_replay_page import page_numbers
 from uuv_marl import load_scenario
 from uuv_marl.envs.state import global_state, state_layout
 from uuv_marl.percept import Percept
@@ -18,6 +15,8 @@ from uuv_marl.replay.page import write_page
 from uuv_marl.replay.record import record
 
 CURRENT = {"current.speed_mps": 0.7, "current.direction_deg": 60.0}
+WATER = CURRENT | {"current.variation_mps": 0.3, "current.eddies": 8, "current.eddy_speed_mps": 1.2}
+SHORT = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0}
 FLOW = 0.7 * np.array([0.5, np.sqrt(0.75)])
 """North and east [m/s]."""
 
@@ -53,10 +52,6 @@ def test_the_global_state_holds_the_velocity_over_ground():
     np.testing.assert_array_equal(fields[1]["yaw_rate"], fields[0]["yaw_rate"])
 
 
-WATER = CURRENT | {"current.variation_mps": 0.3, "current.eddies": 8, "current.eddy_speed_mps": 1.2}
-SHORT = {"time_limit.factor": 0.02, "time_limit.extra_s": 5.0}
-
-
 @pytest.fixture(scope="module")
 def sailed():
     return record(load_scenario(STARTER, overrides=WATER | SHORT), "idle", 0)
@@ -77,8 +72,7 @@ def test_a_recording_tells_the_water_at_every_vehicle(sailed):
 def test_the_page_reads_the_same_water(sailed, tmp_path):
     write_page([sailed], tmp_path / "page.html")
     times = (0.0, 2.0, 5.0)
-    read = json.loads(node(Path(__file__).parent / "page_numbers.mjs", tmp_path / "page.html", *times))
-    for time, numbers in zip(times, read["numbers"][0], strict=True):
+    for time, numbers in zip(times, page_numbers(tmp_path / "page.html", *times)[0], strict=True):
         centre = np.array(numbers["poses"]).reshape(-1, 3)[:, :2]
         ours = sailed.scene_at(time).water.at(centre)
         np.testing.assert_allclose(numbers["flow"], ours, atol=UNITS["drift"] / 2 + 1e-4)

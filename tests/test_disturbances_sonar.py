@@ -32,6 +32,8 @@ COMPASS = {"navigation.compass_bias_deg": 10.0}
 DEAD = {"faults": [{"kind": "array", "array": "bow", "share": 0.5, "onset_s": 1.0, "duration_s": 1.0}]}
 ERRORS = BLUR | FACTOR | DETECTION | SILENCE | FALSE | DRIFT | COMPASS | DEAD
 EVERYTHING = CARRIED | PINGS | {"latency.travel_time": True} | ERRORS
+CURRENT = {"current.speed_mps": 2.0, "current.variation_mps": 1.0, "current.eddies": 16, "current.eddy_speed_mps": 2.0}
+EVERY_CHANNEL = {"sonar.channels": ["compass", "link", "current", "age", "ranged", "modem"]}
 HOLD = 0.1
 SIGMAS = 5.0  # no seed misses these
 
@@ -441,10 +443,6 @@ HARSH = {
     "navigation.drift_share": 1.0, "navigation.compass_bias_deg": 180.0,
 }  # fmt: skip
 FAR = {"noise.silence_probability": 1.0, "noise.nominal_range_m": 4096.0, "noise.passive_ranges": False}
-
-
-CURRENT = {"current.speed_mps": 2.0, "current.variation_mps": 1.0, "current.eddies": 16, "current.eddy_speed_mps": 2.0}
-EVERY_CHANNEL = {"sonar.channels": ["compass", "link", "current", "age", "ranged", "modem"]}
 
 
 @pytest.mark.parametrize("harsh", [EVERYTHING, HARSH, FAR], ids=["everything", "harsh", "far"])

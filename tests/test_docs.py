@@ -6,7 +6,6 @@ import re
 import sys
 import warnings
 from fnmatch import fnmatch
-from pathlib import Path
 from types import ModuleType
 from typing import Literal, get_args, get_origin
 
@@ -15,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from research.episodes import measured, read_rows, select
-from tests.processes import module_of
+from tests.processes import ROOT, module_of
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES
 from uuv_marl.cli import app
@@ -24,7 +23,6 @@ from uuv_marl.tasks import TASKS
 from uuv_marl.tasks.maps.kinds import KINDS
 
 pytestmark = pytest.mark.docs
-ROOT = Path(__file__).resolve().parent.parent
 README, CONTRIBUTING, INDEX = ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs" / "README.md"
 POLICY = [ROOT / name for name in ("SECURITY.md",)]
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.py"))
@@ -117,12 +115,9 @@ def stop_at_once(*args, **kwargs):
 def test_commands_are_understood(line, monkeypatch, tmp_path):
     """Parsed as written, options and names checked, then stopped before the long work."""
     for work in (
-        "benchmark.runner.run_missing",
-        "benchmark.tuning.tune",
-        "benchmark.robustness.job.run",
-        "replay.record.record",
-        "benchmark.results.read_content",
-    ):
+        "benchmark.runner.run_missing", "benchmark.tuning.tune", "benchmark.robustness.job.run",
+        "replay.record.record", "benchmark.results.read_content",
+    ):  # fmt: skip
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
     for work in ("paper.reproduce.make", "dynamics.__main__.identify", "heldout.__main__.run", "verify.check.check"):
         monkeypatch.setattr(f"research.{work}", stop)

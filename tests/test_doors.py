@@ -2,7 +2,6 @@
 
 import io
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 from typing import get_type_hints
@@ -13,7 +12,7 @@ import typer
 
 import uuv_marl
 from tests.nets import ANYWHERE
-from tests.processes import cli
+from tests.processes import python, succeeds
 from tests.swarms import piloted, started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES, PolicyError, make_policy, with_policy_requirements
@@ -86,20 +85,17 @@ def test_a_mask_of_other_worlds_is_refused(active):
         swarm.step(np.zeros((8, 2, 2), np.float32), np.asarray(active))
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("last", 9),
-        ("last", 0),
-        ("num_obstacles", -1),
-        ("num_obstacles", 1000),
-        ("losses", 1 << 40),
-        ("losses", -1),
-        ("detected_index", 6),
-        ("diverged", 77),
-        ("times", np.nan),
-    ],
-)
+@pytest.mark.parametrize(("name", "value"), [
+    ("last", 9),
+    ("last", 0),
+    ("num_obstacles", -1),
+    ("num_obstacles", 1000),
+    ("losses", 1 << 40),
+    ("losses", -1),
+    ("detected_index", 6),
+    ("diverged", 77),
+    ("times", np.nan),
+])  # fmt: skip
 def test_a_snapshot_holds_no_index_out_of_range(name, value):
     swarm = started("lossy", {"losses.times_s": [1.0]}, worlds=2, n=6)
     before, snapshot = swarm.snapshot(), swarm.snapshot()
@@ -230,7 +226,7 @@ def test_every_door_of_a_path_in_python_knows_the_home_folder(home):
     assert "lauv" in show("~/mine.toml")
     assert "lauv" in show_vehicle("~/v.toml")
     for arguments in (["list", "--show", "~/mine.toml"], ["list", "vehicles", "--show", "~/v.toml"]):
-        assert cli(*arguments)[0] == 0
+        succeeds(*arguments)
     trained = POLICIES["mappo"]
     (home / "best").mkdir()
     save_checkpoint("~/best/policy.safetensors", trained.checkpoint.card, trained.checkpoint.tensors)
@@ -333,6 +329,4 @@ for arguments in {lines!r}:
         if ended.code:
             sys.exit(f"{{arguments}} ended with {{ended.code}}")
 """
-    run = [sys.executable, "-OO", "-c", code]
-    done = subprocess.run(run, cwd=tmp_path, capture_output=True, encoding="utf-8", check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
+    python("-OO", "-c", code, folder=tmp_path)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import uuv_marl
-from tests.contract import ARRIVES, SINKS
+from tests.contract import ARRIVES, WIDE
 from uuv_marl import load_scenario, uuv_swarm_v2
 from uuv_marl.baselines import make_policy
 from uuv_marl.percept import Percept
@@ -47,9 +47,6 @@ def test_state(scenario_name):
 
 def test_render():
     render_test(lambda **kwargs: uuv_marl.env(scenario="lossy", num_vehicles=8, **kwargs))
-
-
-SHORT = {"time_limit.factor": 0.05, "time_limit.extra_s": 20.0}
 
 
 def test_observations_are_within_finite_bounds_and_lose_nothing():
@@ -131,7 +128,7 @@ class Tensor:
         raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead.")
 
 
-UNUSABLE = [
+@pytest.mark.parametrize(("action", "message"), [
     ({}, "must hold real numbers, got {}"),
     ({0.1, 0.2}, "must hold real numbers, got {0.1, 0.2}"),
     ("ab", "must hold real numbers, got 'ab'"),
@@ -144,10 +141,7 @@ UNUSABLE = [
     ([1e300, 0.0], r"must be finite, got \[inf, 0.0\]"),
     ([[0.1, 0.2]], r"must have shape \(2,\), got \(1, 2\)"),
     (0.1, r"must have shape \(2,\), got \(\)"),
-]
-
-
-@pytest.mark.parametrize(("action", "message"), UNUSABLE, ids=range(len(UNUSABLE)))
+], ids=range(12))  # fmt: skip
 def test_what_is_no_action_is_refused_by_name(action, message):
     env = uuv_marl.parallel_env(num_vehicles=3)
     env.reset(seed=0)
@@ -178,8 +172,6 @@ def test_np_random_is_seeded_and_touches_nothing():
     np.testing.assert_array_equal(env.np_random.random(4), first)
 
 
-WIDE = {key: value for key, value in SINKS.items() if key != "collision.ends_vehicle"}
-"""Vehicles so wide that they soon collide."""
 ENDINGS = {
     "arrival": {**ARRIVES, "losses.times_s": [1.0]},
     "time_limit": {**WIDE, "time_limit.factor": 0.05, "time_limit.extra_s": 30.0},
@@ -215,13 +207,9 @@ def test_the_last_info_tells_how_it_ended(reason):
     assert set(last) == set(env.possible_agents)
     assert {info["ending"] for info in last.values()} == {"lost", reason}
     world = max(last.values(), key=lambda info: (info["time_s"], info["ending"] == reason))
-    assert world == {
-        "is_success": reason == "arrival",
-        "ending": reason,
-        "arrived": reason == "arrival",
-        "time_s": pytest.approx(env.swarm.facts.time_s[0]),
-        "collisions": collisions,
-    }
+    time_s = pytest.approx(env.swarm.facts.time_s[0])
+    arrived = dict.fromkeys(("is_success", "arrived"), reason == "arrival")
+    assert world == {**arrived, "ending": reason, "time_s": time_s, "collisions": collisions}
     assert all(info["is_success"] == (info["ending"] == "arrival") for info in last.values())
     assert {key: final["final_info"][key][0] for key in world} == world
     assert alone["ending"] == last["uuv_0"]["ending"]

@@ -1,13 +1,12 @@
 """The examples run as they stand, and are short enough to read."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-FOLDER = Path(__file__).resolve().parent.parent / "examples"
-EXAMPLES = sorted((FOLDER / "extending").glob("*.py"))
+from tests.processes import ROOT, python
+
+EXAMPLES = sorted((ROOT / "examples" / "extending").glob("*.py"))
 
 
 @pytest.mark.parametrize(("path", "says"), [
@@ -16,9 +15,7 @@ EXAMPLES = sorted((FOLDER / "extending").glob("*.py"))
     ("sensor", "20 deg askew: arrived after"),
 ])  # fmt: skip
 def test_an_example_runs(path, says):
-    file = next(example for example in EXAMPLES if example.stem == path)
-    done = subprocess.run([sys.executable, file], capture_output=True, text=True, check=True, timeout=300)
-    assert says in done.stdout
+    assert says in python(ROOT / "examples" / "extending" / f"{path}.py")
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)

@@ -6,7 +6,7 @@ import pytest
 from onnx.reference import ReferenceEvaluator
 
 from tests.nets import card_for, saved, tensors
-from tests.processes import cli
+from tests.processes import refused, succeeds
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import POLICIES, PolicyError, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE, load_checkpoint, save_checkpoint
@@ -62,13 +62,13 @@ def test_what_was_trained_for_something_else_is_refused(tmp_path):
 
 def test_the_command(tmp_path):
     best, output = saved(tmp_path, load_scenario("starter"), memory=True), tmp_path / "policy.onnx"
-    assert cli("export", best, output)[0] == 0
+    succeeds("export", best, output)
     assert ReferenceEvaluator(str(output)).input_names == ["observation", "state"]
     other = {"sonar.arrays.bow.sub_sectors": 5}  # the training's scenario is found by what the checkpoint says
     card = card_for(load_scenario("starter", overrides=other), training={"scenario": "starter", "overrides": other})
     save_checkpoint(tmp_path / "other" / WEIGHTS_FILE, card, tensors(card))
-    assert cli("export", tmp_path / "other", output)[0] == 0
-    assert cli("export", best, "/dev/null/policy.onnx")[0] == 2
+    succeeds("export", tmp_path / "other", output)
+    refused("/dev/null", "export", best, "/dev/null/policy.onnx")
 
 
 @pytest.mark.parametrize("name", [name for name, kind in POLICIES.items() if isinstance(kind, Trained)])
@@ -76,7 +76,7 @@ def test_a_shipped_network_is_exported_by_its_name(name, tmp_path, monkeypatch):
     """Also where a folder of that name lies: a path to it is ./NAME."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / name).mkdir()
-    assert cli("export", name, "policy.onnx")[0] == 0
+    succeeds("export", name, "policy.onnx")
     said = {entry.key: entry.value for entry in onnx.load("policy.onnx").metadata_props}
     assert said["checkpoint"] == POLICIES[name].checkpoint.digest == load_checkpoint(name).digest
     with pytest.raises(PolicyError, match=r"can't be read"):

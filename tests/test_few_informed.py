@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.swarms import fly, piloted, started
-from uuv_marl import load_scenario
+from tests.swarms import batched, fly, piloted, started
 from uuv_marl.baselines import make_policy
-from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.envs.state import global_state, state_layout
 
 TIERS = ("few_informed_easy", "few_informed", "few_informed_hard")
@@ -101,8 +99,7 @@ def test_newcomers_begin_at_the_references_velocity_for_the_informed_alone():
 
 
 def test_there_is_at_the_end_once_the_reference_rests_and_who_touched_something_has_failed():
-    batch = BatchedEnv(load_scenario("few_informed", overrides=KNOWN | {"time_limit.factor": 1.0}))
-    batch.reset(0)
+    batch = batched("few_informed", KNOWN | {"time_limit.factor": 1.0})
     swarm, task = batch.swarm, batch.task
     informed = np.flatnonzero(swarm.world_map.informed[0])
     uninformed = np.flatnonzero(~swarm.world_map.informed[0])
@@ -148,9 +145,7 @@ def test_a_swarm_that_amplifies_what_it_hears_goes_at_the_cruise_of_its_follower
 
 
 def test_who_leads_is_paid_for_who_follows():
-    usual, led = (BatchedEnv(load_scenario("few_informed_easy"), 2, reward) for reward in ("dense", "leader"))
-    for batch in (usual, led):
-        batch.reset(7)
+    usual, led = (batched("few_informed_easy", worlds=2, seed=7, reward=reward) for reward in ("dense", "leader"))
     informed, rng = usual.swarm.world_map.informed, np.random.default_rng(0)
     for _ in range(20):
         action = rng.uniform(-1.0, 1.0, (2, 20, 2))

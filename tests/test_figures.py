@@ -1,12 +1,9 @@
 """The benchmark's pictures show what they must, and all pictures have one style."""
 
-import os
-import subprocess
-import sys
-
 import matplotlib as mpl
 import pytest
 
+from tests.processes import ran
 from uuv_marl.benchmark import style
 
 
@@ -48,9 +45,7 @@ for module in {MODULES}:
     except ValueError as error:
         print(2, f"Error: {{error}}")
 """
-    told = {**os.environ, "MPLBACKEND": "nonsense"}
-    python = [sys.executable, "-c", code]
-    done = subprocess.run(python, check=False, cwd=tmp_path, env=told, capture_output=True, text=True)
+    done = ran("-c", code, folder=tmp_path, MPLBACKEND="nonsense")
     line = "2 Error: MPLBACKEND must be a backend of Matplotlib, got 'nonsense'; unset it, or set it to agg"
     assert done.stdout.splitlines() == [line] * (1 + len(MODULES)), done.stderr
     assert not list(tmp_path.iterdir())

@@ -11,7 +11,7 @@ from tests.test_tasks import TWO
 from uuv_marl import load_scenario
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import aim
-from uuv_marl.envs.drawing.frame import Panel, draw, pixels
+from uuv_marl.envs.drawing.frame import Panel, draw_frame, pixels
 from uuv_marl.envs.drawing.legend import signs_of
 from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.replay.encode import payload
@@ -99,7 +99,7 @@ def test_one_group_of_informed_vehicles_is_drawn_as_ever(few):
     assert scene.groups.informed.all()
     np.testing.assert_array_equal(scene.followed_paths[0][1], scene.waypoints)
     known = few._replace(groups=few.groups._replace(informed=np.ones(20, np.bool_)))
-    frames = [pixels(draw([Panel("few", one)], (800, 800), "map")) for one in (few, known)]
+    frames = [pixels(draw_frame([Panel("few", one)], (800, 800), "map")) for one in (few, known)]
     assert not np.array_equal(*frames)
     green = few._replace(groups=few.groups._replace(team=np.ones(20, np.int64)))
     assert not np.array_equal(painted(known)[0], painted(green)[0])

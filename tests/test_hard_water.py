@@ -74,7 +74,6 @@ def test_there_is_along_the_free_way():
 
 
 def test_knobs_that_leave_no_way_are_refused_with_the_remedy():
-    with pytest.raises(
-        ScenarioError, match="of gate, none of them with a path at task.clearance_m = 3; widen the gaps"
-    ):
+    message = "of gate, none of them with a path at task.clearance_m = 3; widen the gaps"
+    with pytest.raises(ScenarioError, match=message):
         water("gate", **{"task.gate.gap_m": [1.0, 2.0]})

@@ -1,16 +1,15 @@
 """The held-out evaluation: its sets, its page by hand, the command, and the shipped page from the shipped rows."""
 
-from pathlib import Path
-
 import pytest
 
 from research.episodes import read_rows, succeeded, write_rows
 from research.heldout import page
 from research.heldout.sets import FIRST, GROUPS, SETS
 from research.second import SECOND
+from tests.processes import ROOT
 from uuv_marl.baselines import POLICIES
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+DOCS = ROOT / "docs"
 
 
 def episode(policy="mappo", seed=5000, **changes):

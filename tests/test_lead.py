@@ -57,15 +57,11 @@ def test_with_a_lead_what_is_wanted_acts_after_one_period(lag_s, share, wanted, 
     assert lead(0, 0, 1, wanted, 0.0, component.kept) == wanted, "no lead asks for what is wanted"
 
 
-@pytest.mark.parametrize(
-    ("overrides", "least"),
-    [
-        ({"actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2}, 5.0),
-        ({"actuators.thrust_lag_s": 0.5, "actuators.yaw_lag_s": 0.5}, 5.0),
-        ({"actuators.yaw_authority": 0.2}, 5.0),
-    ],
-    ids=["0.2 s", "0.5 s", "weak"],
-)
+@pytest.mark.parametrize(("overrides", "least"), [
+    ({"actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2}, 5.0),
+    ({"actuators.thrust_lag_s": 0.5, "actuators.yaw_lag_s": 0.5}, 5.0),
+    ({"actuators.yaw_authority": 0.2}, 5.0),
+], ids=["0.2 s", "0.5 s", "weak"])  # fmt: skip
 def test_with_a_lead_vehicles_do_not_swing(overrides, least):
     """The mean yaw rate on a leg is a fraction of that without; margins of two and more over what six seeds showed."""
     rates = []

@@ -241,18 +241,15 @@ def changed(name, value=None, at=None, **more):
     return made, more
 
 
-@pytest.mark.parametrize(
-    ("made", "message"),
-    [
-        (changed("0.weight", np.zeros((100, 16))), r"0.weight is float32 \(100, 16\), expected float32 \(93, 16\)"),
-        (changed("0.weight", np.nan, (0, 0)), "0.weight must hold finite numbers"),
-        (changed("0.weight", 1e38, (3, 1)), "0.weight must hold finite numbers of at most 1e"),
-        (changed("0.bias", 0.0), r"0.bias is float32 \(1,\), expected"),
-        (changed("2.weight", np.zeros((16, 3))), r"2.weight is float32 \(16, 3\), expected float32 \(16, 2\)"),
-        (changed("gru.bias", memory=True), "gru.bias is missing"),
-        (changed("echo.place", np.zeros((6, 32)), kind="sectors"), r"echo.place is float32 \(6, 32\), expected"),
-    ],
-)
+@pytest.mark.parametrize(("made", "message"), [
+    (changed("0.weight", np.zeros((100, 16))), r"0.weight is float32 \(100, 16\), expected float32 \(93, 16\)"),
+    (changed("0.weight", np.nan, (0, 0)), "0.weight must hold finite numbers"),
+    (changed("0.weight", 1e38, (3, 1)), "0.weight must hold finite numbers of at most 1e"),
+    (changed("0.bias", 0.0), r"0.bias is float32 \(1,\), expected"),
+    (changed("2.weight", np.zeros((16, 3))), r"2.weight is float32 \(16, 3\), expected float32 \(16, 2\)"),
+    (changed("gru.bias", memory=True), "gru.bias is missing"),
+    (changed("echo.place", np.zeros((6, 32)), kind="sectors"), r"echo.place is float32 \(6, 32\), expected"),
+])  # fmt: skip
 def test_weights_that_cannot_run_are_refused(made, message, tmp_path):
     own, more = made
     save_checkpoint(tmp_path / "bad", card_for(water(), **more), own)
@@ -260,18 +257,15 @@ def test_weights_that_cannot_run_are_refused(made, message, tmp_path):
         make_policy(str(tmp_path / "bad"), load_scenario("tracking"))
 
 
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("network", {"hidden": []}),
-        ("network", {"hidden": [0, 4]}),
-        ("decision_period_s", 0.0),
-        ("yaw_damping_nms", float("nan")),
-        ("percept", "none"),
-        ("format", 2),
-        ("wings", 2),
-    ],
-)
+@pytest.mark.parametrize(("field", "value"), [
+    ("network", {"hidden": []}),
+    ("network", {"hidden": [0, 4]}),
+    ("decision_period_s", 0.0),
+    ("yaw_damping_nms", float("nan")),
+    ("percept", "none"),
+    ("format", 2),
+    ("wings", 2),
+])  # fmt: skip
 def test_cards_that_say_nothing_sensible_are_refused(field, value, tmp_path):
     card = card_for(water())
     said = json.dumps({**card.model_dump(mode="json"), field: value})

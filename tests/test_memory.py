@@ -13,15 +13,11 @@ from uuv_marl.baselines.memory.neighbours import age_of
 from uuv_marl.baselines.memory.response import follow, remains
 from uuv_marl.baselines.memory.surroundings import uncertainty
 
+DISCS = ((260.0, 190.0, 15.0), (330.0, 270.0, 25.0), (430.0, 330.0, 10.0))
 COURSE = {
-    "trajectory.waypoints_m": [[150.0, 150.0], [450.0, 250.0], [350.0, 450.0]],
-    "obstacles": [
-        {"centre_m": [260.0, 190.0], "radius_m": 15.0},
-        {"centre_m": [330.0, 270.0], "radius_m": 25.0},
-        {"centre_m": [430.0, 330.0], "radius_m": 10.0},
-    ],
-    "swarm.num_vehicles": 12,
-}
+    "trajectory.waypoints_m": [[150.0, 150.0], [450.0, 250.0], [350.0, 450.0]], "swarm.num_vehicles": 12,
+    "obstacles": [{"centre_m": [x, y], "radius_m": radius} for x, y, radius in DISCS],
+}  # fmt: skip
 """Two legs, obstacles beside them, and rest."""
 SURFACE = {"sonar.echo_reports": "surface"}
 NOISE = {"noise.bearing_deg": 2.0, "noise.range_share": 0.02}
@@ -133,18 +129,14 @@ def test_neighbours_velocities_follow_from_their_places():
     assert (seen.velocity < 0.3).mean() > 0.95
 
 
-@pytest.mark.parametrize(
-    ("disturbance", "median", "worst", "phantoms", "forgotten"),
-    [
-        (NOISE, 0.3, 3.0, 0.05, 0.02),
-        (LATE, 0.05, 0.5, 0.01, 0.02),
-        (CURRENT, 0.05, 0.5, 0.01, 0.02),
-        (NOISE | LATE | CURRENT, 0.5, 3.0, 0.05, 0.05),
-        ({"noise.silence_probability": 0.1, "noise.silence_readings": 10}, 0.05, 3.0, 0.02, 0.25),
-        ({"noise.false_echo_probability": 0.05}, 0.05, 2.0, 0.4, 0.05),
-    ],
-    ids=["noise", "late", "current", "all", "silence", "false_echoes"],
-)
+@pytest.mark.parametrize(("disturbance", "median", "worst", "phantoms", "forgotten"), [
+    (NOISE, 0.3, 3.0, 0.05, 0.02),
+    (LATE, 0.05, 0.5, 0.01, 0.02),
+    (CURRENT, 0.05, 0.5, 0.01, 0.02),
+    (NOISE | LATE | CURRENT, 0.5, 3.0, 0.05, 0.05),
+    ({"noise.silence_probability": 0.1, "noise.silence_readings": 10}, 0.05, 3.0, 0.02, 0.25),
+    ({"noise.false_echo_probability": 0.05}, 0.05, 2.0, 0.4, 0.05),
+], ids=["noise", "late", "current", "all", "silence", "false_echoes"])  # fmt: skip
 def test_obstacles_are_known_in_a_disturbed_sea(disturbance, median, worst, phantoms, forgotten):
     """Margins of about three over what was seen; false echoes are what it bears least."""
     seen = run(SURFACE | disturbance)
@@ -208,16 +200,12 @@ def test_a_neighbour_that_falls_silent_is_kept_for_as_long_as_the_law_says(memor
     assert age_of(0, 0, policy.memory) == 0.0, "and says nothing of the sonar by then"
 
 
-@pytest.mark.parametrize(
-    ("overrides", "least", "most"),
-    [
-        ({}, 0.0, 0.1),
-        ({"actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2}, 0.95, 1.0),
-        ({"noise.bearing_deg": 2.0}, 0.8, 1.0),
-        ({"timing.decision_period_s": 0.5}, 0.25, 1.0),
-    ],
-    ids=["calm", "lag", "noise", "slow"],
-)
+@pytest.mark.parametrize(("overrides", "least", "most"), [
+    ({}, 0.0, 0.1),
+    ({"actuators.thrust_lag_s": 0.2, "actuators.yaw_lag_s": 0.2}, 0.95, 1.0),
+    ({"noise.bearing_deg": 2.0}, 0.8, 1.0),
+    ({"timing.decision_period_s": 0.5}, 0.25, 1.0),
+], ids=["calm", "lag", "noise", "slow"])  # fmt: skip
 def test_vehicles_doubt_where_something_is_not_as_expected(overrides, least, most):
     (swarm, policy), doubts = piloted("scout", "random_field", overrides, seed=10_007, n=20), []
     decisions = round(40.0 / swarm.scenario.timing.decision_period_s)

@@ -50,7 +50,7 @@ for name in () if scenario.current.flows else ANYWHERE:
 print(json.dumps([bits, actions]))
 """
     (bits, actions), (slow_bits, slow_actions) = (
-        json.loads(python(run, json.dumps(overrides), PYTHONWARNINGS="error", NUMBA_DISABLE_JIT=disable))
+        json.loads(python("-c", run, json.dumps(overrides), PYTHONWARNINGS="error", NUMBA_DISABLE_JIT=disable))
         for disable in "01"
     )
     assert [name for name in bits if slow_bits[name] != bits[name]] == []

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from tests.swarms import fly, piloted, started
+from tests.swarms import batched, fly, piloted, started
 from uuv_marl import evaluate, load_scenario
 from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
-from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import ScenarioError
 from uuv_marl.tasks.maps.kinds import KINDS
 
@@ -18,14 +17,11 @@ def told(kinds=tuple(KINDS), vehicles=10, **changes):
     return with_policy_requirements("oracle", base)
 
 
-@pytest.mark.parametrize(
-    ("scenario", "vehicles", "kind"),
-    [
-        *(("hard_water", 10, kind) for kind in KINDS),
-        *(("hard_water", 54, kind) for kind in ("gate", "forest", "harbour")),
-        *((name, None, None) for name in ("two_swarms_easy", "two_swarms", "two_swarms_hard", "silent_targets_easy")),
-    ],
-)
+@pytest.mark.parametrize(("scenario", "vehicles", "kind"), [
+    *(("hard_water", 10, kind) for kind in KINDS),
+    *(("hard_water", 54, kind) for kind in ("gate", "forest", "harbour")),
+    *((name, None, None) for name in ("two_swarms_easy", "two_swarms", "two_swarms_hard", "silent_targets_easy")),
+])  # fmt: skip
 def test_the_oracle_succeeds_on_every_kind_of_map_without_a_collision(scenario, vehicles, kind):
     kinds = {"task.kinds": [kind]} if kind else {}
     runs = evaluate("oracle", scenario, range(FIRST, FIRST + 4), num_vehicles=vehicles, overrides=kinds)
@@ -39,13 +35,10 @@ def test_what_the_channel_tells_is_true(decisions):
     """By a second hand: the point ahead lies on free water, nearer along the way; walls by brute force."""
     swarm, policy = piloted("oracle", told(), worlds=8, seed=FIRST)
     percept = fly(swarm, policy, decisions)
-    task, state, hull = swarm.task, swarm.state, swarm.scenario.collision.hull_radius_m
+    task, state, world_map, hull = swarm.task, swarm.state, swarm.world_map, swarm.scenario.collision.hull_radius_m
     np.testing.assert_allclose(percept["path_length"][:, :, 0], task.path_length_m(), rtol=1e-6)
     for w in range(8):
-        discs, goal = (
-            swarm.world_map.obstacles[w, : swarm.world_map.num_obstacles[w]],
-            swarm.world_map.waypoints[w, 0, 1],
-        )
+        discs, goal = world_map.obstacles[w, : world_map.num_obstacles[w]], world_map.waypoints[w, 0, 1]
         for i in range(10):
             (c, s), at = swarm.heading[w, i], state.eta[w, i, :2]
             out = np.array([[c, s], [-s, c]])  # from the body frame
@@ -76,16 +69,11 @@ def test_without_the_channel_nothing_is_added_and_nothing_changes():
 
 
 def test_a_channel_that_the_task_lacks_is_refused_with_the_remedy():
-    message = (
-        "sonar.channels can't hold 'path' with task 'follow', whose channels are compass, .*, episode; "
-        "task 'hard_water' has it"
-    )
-    for refused in (
-        lambda: load_scenario("starter", overrides={"sonar.channels": ["path"]}),
-        lambda: with_policy_requirements("oracle", load_scenario("starter")),
-    ):
-        with pytest.raises(ScenarioError, match=message):
-            refused()
+    message = "can't hold 'path' with task 'follow', whose channels are compass, .*, episode; task 'hard_water' has it"
+    with pytest.raises(ScenarioError, match=f"sonar.channels {message}"):
+        load_scenario("starter", overrides={"sonar.channels": ["path"]})
+    with pytest.raises(ScenarioError, match=message):
+        with_policy_requirements("oracle", load_scenario("starter"))
     with pytest.raises(ScenarioError, match="can't hold 'wya' with task 'hard_water', whose channels are .*, path$"):
         load_scenario("hard_water", overrides={"sonar.channels": ["wya"]})
     for name in ("starter", "hard_water"):
@@ -94,16 +82,14 @@ def test_a_channel_that_the_task_lacks_is_refused_with_the_remedy():
 
 
 def test_geodesic_progress_is_what_the_way_has_shortened_by():
-    plain = load_scenario("hard_water")
-    knowing, dense = (BatchedEnv(plain, 4, reward) for reward in ("geodesic", "dense"))
-    for env in (knowing, dense):
-        env.reset(FIRST)
+    knowing, dense = (batched("hard_water", worlds=4, seed=FIRST, reward=reward) for reward in ("geodesic", "dense"))
     before, total = knowing.task.path_length_m(), 0.0
     for _ in range(20):
         result, usual = (env.step(np.full((4, 10, 2), 0.6)) for env in (knowing, dense))
         total += result.terms["progress"]
         for term in ("obstacle", "spacing", "effort", "collision", "stay"):
             np.testing.assert_array_equal(result.terms[term], usual.terms[term])
-    np.testing.assert_allclose(total, (before - knowing.task.path_length_m()) / plain.reward.progress_m, atol=1e-9)
+    shorter = (before - knowing.task.path_length_m()) / knowing.swarm.scenario.reward.progress_m
+    np.testing.assert_allclose(total, shorter, atol=1e-9)
     with pytest.raises(ValueError, match="choose one of task 'follow'"):
-        BatchedEnv(load_scenario("starter"), 1, "geodesic")
+        batched("starter", reward="geodesic")

@@ -29,14 +29,11 @@ def series(key=KEY, purpose=1, vehicle=0, num=50_000):
     return uniform, normal
 
 
-@pytest.mark.parametrize(
-    ("key", "counter", "expected"),
-    [
-        (0, [0, 0, 0, 0], "6627e8d5 e169c58d bc57ac4c 9b00dbd8"),
-        (2**64 - 1, [2**32 - 1] * 4, "408f276d 41c83b0e a20bc7c6 6d5451fd"),
-        (KEY, [0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344], "d16cfe09 94fdcceb 5001e420 24126ea1"),
-    ],
-)
+@pytest.mark.parametrize(("key", "counter", "expected"), [
+    (0, [0, 0, 0, 0], "6627e8d5 e169c58d bc57ac4c 9b00dbd8"),
+    (2**64 - 1, [2**32 - 1] * 4, "408f276d 41c83b0e a20bc7c6 6d5451fd"),
+    (KEY, [0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344], "d16cfe09 94fdcceb 5001e420 24126ea1"),
+])  # fmt: skip
 def test_known_answers_of_random123(key, counter, expected):
     words = random.philox(np.uint64(key), *(np.uint64(word) for word in counter))
     assert " ".join(f"{int(word):08x}" for word in words) == expected

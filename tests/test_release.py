@@ -7,12 +7,12 @@ tested in test_setup.py, with every run.
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
+from tests.processes import ROOT
+
 pytestmark = [pytest.mark.release, pytest.mark.needs("build")]
-ROOT = Path(__file__).resolve().parent.parent
 
 
 def run(*command, **options):
@@ -50,18 +50,14 @@ def installed(wheel, tmp_path_factory):
     return command
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["--help"], "robustness"),
-        (["--version"], "uuv_marl "),
-        (["list"], "remus100"),
-        (["list", "--show", "starter"], "num_vehicles = 5"),
-        (["benchmark", "--scenario", "starter", "--seeds", "1", "--policy", "mappo", "--output", "out"], "Every seed:"),
-        (["replay", "out", "--output", "episode.html"], "episode.html"),
-    ],
-    ids=lambda value: "_".join(value[:2]) if isinstance(value, list) else "",
-)
+@pytest.mark.parametrize(("words", "says"), [
+    (["--help"], "robustness"),
+    (["--version"], "uuv_marl "),
+    (["list"], "remus100"),
+    (["list", "--show", "starter"], "num_vehicles = 5"),
+    (["benchmark", "--scenario", "starter", "--seeds", "1", "--policy", "mappo", "--output", "out"], "Every seed:"),
+    (["replay", "out", "--output", "episode.html"], "episode.html"),
+], ids=lambda value: "_".join(value[:2]) if isinstance(value, list) else "")  # fmt: skip
 def test_a_command_works_outside_the_checkout(installed, words, says):
     code, output = installed(*words)
     assert code == 0, output

@@ -12,7 +12,7 @@ from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.envs.core import make_batched_env
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import Camera, aim
-from uuv_marl.envs.drawing.frame import Panel, _numbers, draw, pixels
+from uuv_marl.envs.drawing.frame import Panel, _numbers, draw_frame, pixels
 from uuv_marl.envs.drawing.painter import Painter
 from uuv_marl.envs.drawing.scene import TRAIL_S, SceneHistory
 from uuv_marl.envs.solo import SoloEnv
@@ -93,7 +93,7 @@ def test_cameras_show_what_they_promise(scenario):
 def test_a_long_title_stays_in_its_own_panel():
     scene, _, _ = played(seconds=0.0)
     pictures = [
-        pixels(draw([Panel(name, scene), Panel("scout", scene)], (800, 400), "follow", columns=2))
+        pixels(draw_frame([Panel(name, scene), Panel("scout", scene)], (800, 400), "follow", columns=2))
         for name in ("scout", "a/very/long/path/to/a/checkpoint/of/a/policy.safetensors at 101 s")
     ]
     right = np.s_[:, 400:]
@@ -183,9 +183,7 @@ def test_every_interface_draws_as_its_options_say_and_a_copy_alike():
     assert len({picture.tobytes() for picture in drawn[::4]}) == 4
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
+@pytest.mark.parametrize(("options", "message"), [
         ("big", "render_options: Input should be a valid dictionary"),
         ({"siez": (3, 3)}, "render_options: siez is unknown; did you mean 'size'"),
         ({"size": (10, 800)}, "size.0 must be greater than or equal to 320, got 10"),
@@ -193,8 +191,7 @@ def test_every_interface_draws_as_its_options_say_and_a_copy_alike():
         ({"camera": np.zeros(2)}, "camera must be 'follow' or 'map', got"),
         ({"camera": "fly"}, "camera must be 'follow' or 'map', got 'fly'"),
         ({"sonar_of": 5}, r"\['sonar_of'\] must be the index of a vehicle, 0 to 4, or None, got 5"),
-    ],
-)
+])  # fmt: skip
 def test_options_that_can_not_be_used_are_named(options, message):
     with pytest.raises(ValueError, match=message):
         uuv_marl.parallel_env("starter", render_mode="rgb_array", render_options=options)

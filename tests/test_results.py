@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.processes import SETS, cli, quick
+from tests.processes import ROOT, SETS, quick, refused, succeeds
 from tests.swarms import run_of
 from uuv_marl import atomic, load_scenario
 from uuv_marl.atomic import locked
@@ -23,7 +23,7 @@ from uuv_marl.benchmark.tables import markdown_table, scenario_table
 from uuv_marl.errors import ResultsError
 from uuv_marl.tasks.measures import Shares
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmark.md"
+PAGE = ROOT / "docs" / "benchmark.md"
 
 
 def made(folder, policies=("idle",), seeds=(0, 1)):
@@ -39,24 +39,21 @@ def edit(folder, change):
     path.write_text(json.dumps(data))
 
 
-def command(*arguments, output="results/benchmark"):
-    return cli("benchmark", "--seeds=1", *arguments, f"--output={output}", *SETS)
+def command(policy, output="results/benchmark", seeds=1):
+    return "benchmark", f"--seeds={seeds}", f"--policy={policy}", f"--output={output}", *SETS
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda data: data.update(schema=1), "schema"),
-        (lambda data: data.pop("policies"), "policies"),
-        (lambda data: data.update(policies={}), "'idle', which is not described"),
-        (lambda data: data.update(policies={"idle": {}}), "policies.idle"),
-        (lambda data: data["runs"][0]["metrics"].pop("effort"), "runs.0.metrics.effort"),
-        (lambda data: data["runs"][0].update(seed="0"), "runs.0.seed"),
-        (lambda data: data["versions"].update(numpy="0.0.1"), r"comes from numpy 0\.0\.1, and here is"),
-        (lambda data: data["versions"].update(uuv_marl="0.0.1"), r"comes from uuv_marl 0\.0\.1, and here is"),
-        (lambda data: data.update(fingerprint="0"), "code 0, and here is"),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    (lambda data: data.update(schema=1), "schema"),
+    (lambda data: data.pop("policies"), "policies"),
+    (lambda data: data.update(policies={}), "'idle', which is not described"),
+    (lambda data: data.update(policies={"idle": {}}), "policies.idle"),
+    (lambda data: data["runs"][0]["metrics"].pop("effort"), "runs.0.metrics.effort"),
+    (lambda data: data["runs"][0].update(seed="0"), "runs.0.seed"),
+    (lambda data: data["versions"].update(numpy="0.0.1"), r"comes from numpy 0\.0\.1, and here is"),
+    (lambda data: data["versions"].update(uuv_marl="0.0.1"), r"comes from uuv_marl 0\.0\.1, and here is"),
+    (lambda data: data.update(fingerprint="0"), "code 0, and here is"),
+])  # fmt: skip
 def test_a_file_that_lacks_something_or_comes_from_elsewhere_is_refused_by_its_name(tmp_path, change, message):
     made(tmp_path)
     edit(tmp_path, change)
@@ -105,9 +102,7 @@ def test_a_policy_that_nobody_asked_for_is_not_imported(tmp_path, monkeypatch):
         trace.symlink_to(trace_path(folder, "single_obstacle", "idle", 0).resolve())
 
     edit(folder, foreign)
-    status, text = command("--policy=idle", output=folder)
-    assert status == 0, text
-    assert "notes:X" in text
+    assert "notes:X" in succeeds(*command("idle", folder))
     assert not (tmp_path / "ran").exists()
     assert "notes" not in sys.modules
 
@@ -116,9 +111,9 @@ def test_the_current_folder_comes_last_and_only_for_modules(tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
     before = list(sys.path)
-    assert command("--policy=idle")[0] == 0
+    succeeds(*command("idle"))
     assert sys.path == before
-    command("--policy=nowhere:Thing")
+    refused("can't be imported", *command("nowhere:Thing"))
     assert sys.path == [*before, ""]
 
 
@@ -174,20 +169,16 @@ class Nan(Policy):
 """
 
 
-@pytest.mark.parametrize(
-    ("name", "messages"),
-    [
-        ("Misspelt", ["KeyError", "refrence", "users_own.py:7, in decide", "users_own.py:10, in towards"]),
-        ("Nan", ["policy 'users_own:Nan'", "action", "finite"]),
-    ],
-)
+@pytest.mark.parametrize(("name", "messages"), [
+    ("Misspelt", ["KeyError", "refrence", "users_own.py:7, in decide", "users_own.py:10, in towards"]),
+    ("Nan", ["policy 'users_own:Nan'", "action", "finite"]),
+])  # fmt: skip
 def test_an_error_in_a_users_policy_shows_the_users_lines_alone(tmp_path, monkeypatch, name, messages):
     (tmp_path / "users_own.py").write_text(USERS)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
-    status, text = command(f"--policy=users_own:{name}")
+    text = refused(messages[0], *command(f"users_own:{name}"))
     sys.modules.pop("users_own", None)
-    assert status == 2
     assert "Traceback" not in text
     assert "evaluate.py" not in text
     assert len(text) < 1500
@@ -197,11 +188,9 @@ def test_an_error_in_a_users_policy_shows_the_users_lines_alone(tmp_path, monkey
 
 def test_a_second_command_in_a_folder_is_refused(tmp_path):
     with locked(tmp_path):
-        status, text = command("--policy=idle", output=tmp_path)
-    assert status == 2
-    assert f"is in use by process {os.getpid()} on" in text
+        refused(f"is in use by process {os.getpid()} on", *command("idle", tmp_path))
     assert not (tmp_path / "results.json").exists()
-    assert command("--policy=idle", output=tmp_path)[0] == 0
+    succeeds(*command("idle", tmp_path))
 
 
 @pytest.mark.parametrize("writes", [2, 3, 4, 5, 6])
@@ -215,14 +204,11 @@ def test_a_full_disk_loses_nothing(tmp_path, monkeypatch, writes):
 
     with monkeypatch.context() as full:
         full.setattr(atomic.os, "fsync", fsync)
-        status, text = command("--policy=idle", "--seeds=2", output=tmp_path)
-    assert status == 2
-    assert "can't be written (No space left on device)" in text
+        text = refused("can't be written (No space left on device)", *command("idle", tmp_path, 2))
     assert "What was finished before is safe" in text
     assert "Traceback" not in text
     assert not list(tmp_path.rglob("*.partial*"))
-    status, text = command("--policy=idle", "--seeds=2", output=tmp_path)
-    assert status == 0, text
+    succeeds(*command("idle", tmp_path, 2))
     made(tmp_path / "uninterrupted")
     folders = tmp_path / "uninterrupted", tmp_path
     expected, here = (json.loads((folder / "results.json").read_text())["runs"] for folder in folders)

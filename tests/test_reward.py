@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import uuv_marl
+from tests.swarms import batched
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy
-from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario.task import task_class
 
 PUPPETS = ("follow", "reach")
@@ -37,8 +37,7 @@ GUIDED = [
 
 
 def mean_return(name, scenario, reward, worlds):
-    batch, policy = BatchedEnv(scenario, worlds, reward), make_policy(name, scenario, worlds)
-    batch.reset(0)
+    batch, policy = batched(scenario, worlds=worlds, reward=reward), make_policy(name, scenario, worlds)
     policy.reset(0)
     total = np.zeros(worlds)
     while not batch.over.all():
@@ -62,8 +61,7 @@ class Puppets:
 
     def __init__(self, task="follow", reward="dense", n=4, **overrides):
         scenario, own = PLACES[task]
-        batch = BatchedEnv(load_scenario(scenario, num_vehicles=n, overrides={**own, **overrides}), reward=reward)
-        batch.reset(0)
+        batch = batched(scenario, own | overrides, n=n, reward=reward)
         self.batch, self.n, self.swarm, world_map = batch, n, batch.swarm, batch.swarm.world_map
         group = world_map.group[0]
         self.end = world_map.waypoints[0, group, world_map.last[0, group]]
@@ -114,8 +112,7 @@ def left(batch):
 @pytest.mark.parametrize(("task", "reward"), [pair for pair in PAID if pair[1] not in ("sparse", "leader")])
 def test_progress_sums_to_what_the_way_has_shortened_by_and_but_for_being_there_all_else_costs(task, reward, seed):
     scenario, own = PLACES[task]
-    batch = BatchedEnv(load_scenario(scenario, num_vehicles=6, overrides=own), reward=reward)
-    batch.reset(seed)
+    batch = batched(scenario, own, seed=seed, n=6, reward=reward)
     first, total = left(batch), 0.0
     push = np.random.default_rng(seed).uniform(-1.0, 1.0, (1, 6, 2)) * (0.7, 0.1)
     for _ in range(30):
@@ -164,11 +161,9 @@ def test_dying_never_pays_the_one_who_dies(reward, task):
         pytest.skip(f"{task} has no such reward")
     scenario, own = PLACES[task]
     changes = {**own, "time_limit.factor": 0.5} | ({"task.informed": 6} if task == "few_informed" else {})
-    base = load_scenario(scenario, num_vehicles=6, overrides=changes)
     totals, lost = [], []
     for losses in ([], [1.0]):
-        batch = BatchedEnv(load_scenario(base, overrides={"losses.times_s": losses}), reward=reward)
-        batch.reset(3)
+        batch = batched(scenario, changes | {"losses.times_s": losses}, seed=3, n=6, reward=reward)
         lost += batch.swarm.world_map.losses[0].tolist()
         total = np.zeros(6)
         while not batch.over[0]:
@@ -215,9 +210,7 @@ def test_terms_are_those_documented_and_sum_to_the_reward_whose_mean_the_team_ha
 
 def test_sparse_is_dense_without_progress():
     """Where nobody is lost and nobody arrives, the other terms are the same, bit for bit."""
-    runs = [BatchedEnv(load_scenario("starter"), 2, reward) for reward in ("dense", "sparse")]
-    for batch in runs:
-        batch.reset(0)
+    runs = [batched("starter", worlds=2, reward=reward) for reward in ("dense", "sparse")]
     for _ in range(20):
         dense, sparse = (batch.step(np.full((2, 5, 2), 0.3)).terms for batch in runs)
         assert list(sparse) == [name for name in dense if name != "progress"]

@@ -1,12 +1,11 @@
 """The robustness suite: axes as data, one start at every level, scores by hand, resuming, the command."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.processes import cli
+from tests.processes import ROOT, succeeds
 from uuv_marl import load_scenario
 from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.robustness import job, page, scores
@@ -14,8 +13,10 @@ from uuv_marl.benchmark.robustness.axes import AXES, BASE, CALM, GROUPS, overrid
 from uuv_marl.benchmark.success import GRACE_S
 from uuv_marl.scenario import disturbances
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+DOCS = ROOT / "docs"
 PLACES = [(axis.name, level) for axis in AXES.values() for level in axis.levels]
+TINY = job.Plan(("A1", "C1"), (1, 5), ("starter",), ("bio_inspired",), 1)
+UNLIKE = ("S2", "S3", "S4", "S5", "S7", "S8", "F1", "X", "C1")
 pytestmark = pytest.mark.needs("pandas")
 
 
@@ -81,9 +82,6 @@ def test_a_group_of_which_every_seed_misses_a_cell_has_no_score():
     assert scores.group_score(half, scores.EVERY) is None
 
 
-TINY = job.Plan(("A1", "C1"), (1, 5), ("starter",), ("bio_inspired",), 1)
-
-
 def test_a_cell_that_is_done_is_not_run_again(tmp_path, monkeypatch):
     asked = []
 
@@ -103,7 +101,7 @@ def test_a_cell_that_is_done_is_not_run_again(tmp_path, monkeypatch):
 
 def test_the_command_writes_results_page_and_picture(tmp_path):
     words = "--scenario starter --axis A1 --axis C1 --level 1 --level 5 --policy bio_inspired --seeds 1 --output"
-    assert cli("robustness", *words.split(), tmp_path)[0] == 0
+    succeeds("robustness", *words.split(), tmp_path)
     text = (tmp_path / "robustness.md").read_text()
     assert "| A1 | actuator lag |" in text
     assert "| C1 |" not in text, "it uses neither link nor modem"
@@ -121,9 +119,6 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
 @pytest.mark.docs
 def test_the_shipped_page_is_made_of_the_shipped_episodes():
     assert (DOCS / "robustness.md").read_text() == page.report(job.read_episodes(DOCS / "robustness.csv.gz"))
-
-
-UNLIKE = ("S2", "S3", "S4", "S5", "S7", "S8", "F1", "X", "C1")
 
 
 @pytest.mark.parametrize("name", [name for name in AXES if name not in UNLIKE])

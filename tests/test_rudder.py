@@ -8,8 +8,8 @@ import pytest
 
 from tests.swarms import fly, piloted
 from uuv_marl import load_scenario
-from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
-from uuv_marl.baselines.policy import Limits, Policy
+from uuv_marl.baselines import PolicyError, make_policy
+from uuv_marl.baselines.policy import Limits
 from uuv_marl.baselines.requirements import inner_loop_nms
 from uuv_marl.baselines.rudder import STEERAGE, Rudder, steer_by_rudder
 from uuv_marl.baselines.steering import steer
@@ -84,16 +84,7 @@ def test_torpedoes_pass_an_obstacle_without_a_collision(name):
     assert collisions == 0
 
 
-class Acts(Policy):
-    def act(self, percept):
-        return np.zeros((*percept.flat.shape[:2], 2), np.float32)
-
-
-def test_bad_combinations_are_refused_with_the_remedy():
-    with pytest.raises(PolicyError, match=r":Acts' must define decide\(percept\), and leave act, .* alone"):
-        make_policy("tests.test_rudder:Acts", LAUV)
-    with pytest.raises(PolicyError, match=r"mappo was trained on another vehicle .* any_vehicle=True"):
-        make_policy("mappo", with_policy_requirements("mappo", LAUV))
+def test_a_yaw_damping_that_the_vehicle_lacks_is_named_in_its_own_size():
     rov = with_vehicle("bluerov2_heavy", speed=0.5)
     needed = re.escape(f"a yaw damping of {inner_loop_nms(600.0, 3000.0, rov):g} N m s")
     with pytest.raises(PolicyError, match=f"scout needs {needed}"):

@@ -1,9 +1,5 @@
 """Stable-Baselines3 itself: its PPO and SAC, its wrappers, its checks, on our environments."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import gymnasium
 import numpy as np
 import pytest
@@ -17,6 +13,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.common.vec_env import VecCheckNan, VecFrameStack, VecMonitor, VecNormalize
 
 from tests.contract import ARRIVES
+from tests.processes import ROOT, python
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.baselines import PolicyError, make_policy, with_policy_requirements
 from uuv_marl.envs.sb3 import SwarmVecEnv
@@ -187,10 +184,9 @@ def test_a_model_that_makes_no_checkpoint_is_refused(tmp_path):
 
 
 def test_the_example_trains_a_policy(tmp_path):
-    file = Path(__file__).resolve().parent.parent / "examples" / "training" / "sb3.py"
-    command = [sys.executable, file, "--worlds=1", "--steps=100", f"--output={tmp_path}"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
-    assert f"--scenario starter --policy {tmp_path}" in done.stdout
+    words = ["--worlds=1", "--steps=100", f"--output={tmp_path}"]
+    said = python(ROOT / "examples" / "training" / "sb3.py", *words)
+    assert f"--scenario starter --policy {tmp_path}" in said
     assert PPO.load(tmp_path / "model").num_timesteps > 100
     scenario = with_policy_requirements(str(tmp_path), load_scenario("starter"))
     assert make_policy(str(tmp_path), scenario).requirements.yaw_damping_nms == 600.0

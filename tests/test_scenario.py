@@ -18,6 +18,8 @@ FOLDER = resources.files("uuv_marl.scenario")
 BASE = "single_obstacle"
 SCENARIOS = (*LARGE, "starter")
 NO_NUMBERS = ("version", "title", "source", "name")
+FAULTS = [{"kind": "array", "share": 0.1, "array": "bow"}, {"kind": "yaw", "share": 0.2, "onset_s": 3.0}]
+SEA = {"current.speed_mps": 0.5, "current.direction_deg": 30.0, "modem.period_s": 9.0, "faults": FAULTS}
 SOURCES = (
     r"section|Table|Eq\.|assumed|none in the paper|as in the paper|MBARI|Nanomodem|"
     r"Repoulias|da Silva|Havenstrøm|lauv_gazebo|Prestero|Fossen|Allen|Sgarioto|von Benzon|Wu"
@@ -30,10 +32,6 @@ def test_every_number_carries_its_source(name):
         value = line.split("#")[0]
         if re.search(r"=.*(\d|true|false|\[\])", value) and not value.startswith(NO_NUMBERS):
             assert re.search(SOURCES, line.partition("#")[2]), line
-
-
-FAULTS = [{"kind": "array", "share": 0.1, "array": "bow"}, {"kind": "yaw", "share": 0.2, "onset_s": 3.0}]
-SEA = {"current.speed_mps": 0.5, "current.direction_deg": 30.0, "modem.period_s": 9.0, "faults": FAULTS}
 
 
 @pytest.mark.parametrize(("name", "overrides"), [*((name, {}) for name in SCENARIOS), (BASE, SEA)])
@@ -71,16 +69,8 @@ def test_what_is_shown_loads_and_names_the_file_of_each_number(form, tmp_path):
 
 
 def test_overrides_reach_every_level():
-    scenario = load_scenario(
-        BASE,
-        num_vehicles=10,
-        overrides={
-            "sonar.arrays.bow.range_m": 80.0,
-            "sonar.arrays.1.sub_sectors": 3,
-            "obstacles.0.radius_m": 30.0,
-            "sonar.channels": ["link"],
-        },
-    )
+    sonar = {"sonar.arrays.bow.range_m": 80.0, "sonar.arrays.1.sub_sectors": 3, "sonar.channels": ["link"]}
+    scenario = load_scenario(BASE, num_vehicles=10, overrides=sonar | {"obstacles.0.radius_m": 30.0})
     assert scenario.swarm.num_vehicles == 10
     assert [a.range_m for a in scenario.sonar.arrays] == [80.0, 500.0, 500.0]
     assert scenario.sonar.arrays[1].sub_sectors == 3
@@ -91,15 +81,12 @@ def test_overrides_reach_every_level():
     assert mine["faults"] == [{"kind": "yaw", "share": 0.5}], "a caller's overrides stay as they are"
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
+@pytest.mark.parametrize(("text", "expected"), [
         ("swarm.num_vehicles=20", ("swarm.num_vehicles", 20)),
         ("sonar.echo_reports=surface", ("sonar.echo_reports", "surface")),
         ('sonar.channels=["link"]', ("sonar.channels", ["link"])),
         ("collision.ends_vehicle = true", ("collision.ends_vehicle", True)),
-    ],
-)
+])  # fmt: skip
 def test_overrides_from_the_command_line(text, expected):
     assert parse_override(text) == expected
 
@@ -217,9 +204,7 @@ def test_bad_values_name_field_value_and_remedy(scenario, overrides, message):
         Swarm(load_scenario(scenario, overrides=overrides))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
+@pytest.mark.parametrize(("arguments", "message"), [
         ({"scenario": 5}, "scenario must be a name, a path ending in .toml, or a Scenario, got 5"),
         ({"scenario": "single_obstcle"}, "did you mean 'single_obstacle'"),
         ({"scenario": "mycourse"}, "scenario 'mycourse' is unknown; give one of few_informed, .* or a path"),
@@ -229,8 +214,7 @@ def test_bad_values_name_field_value_and_remedy(scenario, overrides, message):
         ({"overrides": {"swarm.num_vehicles": iter([1])}}, "swarm.num_vehicles must be"),
         ({"scenario": "random_field", "overrides": {"random_field.legs": [3, 1]}}, "random_field.legs"),
         ({"scenario": "random_field", "overrides": {"random_field.obstacles": [0, 100]}}, "random_field.obstacles"),
-    ],
-)
+])  # fmt: skip
 def test_bad_arguments_are_named(arguments, message):
     with pytest.raises(ScenarioError, match=message):
         load_scenario(**{"scenario": BASE, **arguments})
@@ -251,9 +235,7 @@ def test_a_file_extends_one_beside_it(tmp_path):
         load_scenario((tmp_path / "b.toml").rename(tmp_path / "my b.toml"))
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+@pytest.mark.parametrize(("text", "message"), [
         ('extends = "../here/mine.toml"\n', "must not lead back"),
         ("extends = 3\n", "extends must be a scenario's name or file, got 3"),
         ("\udcff", "not valid TOML"),
@@ -262,9 +244,7 @@ def test_a_file_extends_one_beside_it(tmp_path):
         ("x = " + "[" * 3000, "nested too deeply"),
         ("x = " + "9" * 5000, "not valid TOML"),
         ("x = 1 #" + " " * 1_000_000, "not a scenario: it has more than 1,000,000 bytes"),
-    ],
-    ids=range(8),
-)
+], ids=range(8))  # fmt: skip
 def test_a_file_that_is_no_scenario_is_refused(tmp_path, text, message):
     (tmp_path / "here").mkdir()
     (tmp_path / "here" / "mine.toml").write_bytes(text.encode("utf-8", "surrogateescape"))
@@ -286,15 +266,13 @@ def test_what_is_refused_as_stiff_does_diverge(n_r, n_rr, diverges):
     assert (not np.isfinite(state).all() or max(map(abs, state[3:])) > 100) is diverges
 
 
-VEHICLE = ("m_kg", "I_z_kgm2", "X_udot_kg", "Y_vdot_kg", "N_rdot_kgm2", "X_u", "Y_v", "N_r", "X_uu", "Y_vv", "N_rr")
-
-
 def test_no_vehicle_is_accepted_that_runs_away_in_a_minute():
     from uuv_marl.sim.vehicle import STILL, advance, plant
 
+    names = ["m_kg", "I_z_kgm2", "X_udot_kg", "Y_vdot_kg", "N_rdot_kgm2", "X_u", "Y_v", "N_r", "X_uu", "Y_vv", "N_rr"]
     rng, base, accepted = np.random.default_rng(5), load_scenario(BASE), 0
     for _ in range(30):
-        scale = dict(zip(VEHICLE, np.exp(rng.uniform(-2.3, 2.3, len(VEHICLE))), strict=True))
+        scale = dict(zip(names, np.exp(rng.uniform(-2.3, 2.3, len(names))), strict=True))
         changes = {f"vehicle.{name}": getattr(base.vehicle, name) * float(k) for name, k in scale.items()}
         force, torque = 3000.0 * np.exp(rng.uniform(-3.4, 3.4, 2))
         changes |= {"actuators.max_force_n": float(force), "actuators.max_torque_nm": float(torque)}
@@ -321,32 +299,24 @@ for what in ('scenarios', 'policies'): assert CliRunner().invoke(app, ['list', w
 """
 
 
-@pytest.mark.parametrize(
-    ("code", "heavy"),
-    [
+@pytest.mark.parametrize(("code", "heavy"), [
         ("import uuv_marl", {"numba", "torch", "matplotlib", "ray"}),
         (READ_TWO, {"numba", "scipy"}),
         (LIST_ALL, {"matplotlib", "scipy.stats"}),
-    ],
-    ids=["import", "load_scenario", "uuv-marl list"],
-)
+], ids=["import", "load_scenario", "uuv-marl list"])  # fmt: skip
 def test_light_work_imports_nothing_heavy(code, heavy):
-    python(f"{code}\nimport sys; assert not {heavy!r} & set(sys.modules)")
+    python("-c", f"{code}\nimport sys; assert not {heavy!r} & set(sys.modules)")
 
 
 def test_a_scenario_names_its_vehicle_whose_numbers_stand_in_a_file(tmp_path):
     scenario = load_scenario("tracking")
-    assert scenario.vehicle.name == "literature_185"
     assert load_scenario(scenario, overrides={"vehicle": "literature_185"}) == scenario
-    shown = show("tracking")
-    assert 'name = "literature_185"' in shown
-    assert "m_kg = 185.0  # Repoulias and Papadopoulos 2007" in shown
+    assert 'name = "literature_185"' in show("tracking")
     hull = (FOLDER / "vehicles" / "literature_185.toml").read_text()
     heavy = hull.replace("m_kg = 185.0", "m_kg = 300.0").replace('"literature_185"', '"heavy"')
     (tmp_path / "heavy.toml").write_text(heavy)
-    own = tmp_path / "mine.toml"
-    own.write_text('vehicle = "heavy.toml"\nextends = "tracking"\n')
-    mine = load_scenario(own)
+    (tmp_path / "mine.toml").write_text('vehicle = "heavy.toml"\nextends = "tracking"\n')
+    mine = load_scenario(tmp_path / "mine.toml")
     assert (mine.vehicle.name, mine.vehicle.m_kg, mine.actuators) == ("heavy", 300.0, scenario.actuators)
     assert load_scenario(mine) == mine
 
@@ -373,9 +343,7 @@ def test_a_vehicle_of_one_s_own_takes_nothing_from_the_paper_s(tmp_path):
     assert load_scenario(path).vehicle == own.vehicle
 
 
-@pytest.mark.parametrize(
-    ("field", "same", "given"),
-    [
+@pytest.mark.parametrize(("field", "same", "given"), [
         ("sonar.channels", ["compass"], UserList(["compass"])),
         ("sonar.channels", ["compass"], np.array(["compass"])),
         ("swarm.num_vehicles", 7, np.int64(7)),
@@ -386,8 +354,7 @@ def test_a_vehicle_of_one_s_own_takes_nothing_from_the_paper_s(tmp_path):
         ("trajectory.speed_mps", 3.5, np.float32(3.5)),
         ("obstacles", [{"centre_m": [1.0, 2.0], "radius_m": 3.0}],
          UserList([UserDict(centre_m=np.array([1.0, 2.0]), radius_m=np.float64(3.0))])),
-    ],
-)  # fmt: skip
+])  # fmt: skip
 def test_a_value_of_an_override_is_taken_for_what_it_can_do(field, same, given):
     assert load_scenario("lossy", overrides={field: given}) == load_scenario("lossy", overrides={field: same})
     path = field.split(".")

@@ -1,10 +1,9 @@
 """Networks that ship and their second trainings: each is what its recipe makes, and runs where its task is."""
 
-from pathlib import Path
-
 import pytest
 
 from research.second import SECOND, runnable
+from tests.processes import ROOT
 from uuv_marl import load_scenario
 from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
 from uuv_marl.baselines.learned.trained import Trained
@@ -13,7 +12,7 @@ from uuv_marl.scenario import scenario_names
 from uuv_marl.sim.observation import observation_layout
 from uuv_marl.train.training import Training, recipe_fields
 
-RECIPES = Path(__file__).parents[1] / "examples" / "training"
+RECIPES = ROOT / "examples" / "training"
 NETWORKS = [*(name for name, kind in POLICIES.items() if isinstance(kind, Trained)), *SECOND]
 
 

@@ -5,10 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tests.swarms import fly, started
+from tests.swarms import batched, fly, started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import make_policy, with_policy_requirements
-from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.errors import PolicyError
 from uuv_marl.scenario.vehicle_checks import top_speed
 
@@ -94,8 +93,7 @@ def test_the_heading_in_the_box_is_by_compass():
 
 def test_the_held_share_is_that_of_the_last_half():
     """Of four targets one is held all along, one from three quarters on, one in the first half, one never."""
-    batch = BatchedEnv(load_scenario("silent_targets_easy"))
-    batch.reset(TUNING)
+    batch = batched("silent_targets_easy", seed=TUNING)
     swarm, task = batch.swarm, batch.task
     limit = swarm.time_limit_s[0]
     while not batch.over.all():

@@ -1,18 +1,13 @@
 """The step keeps its distance to what the machine can do; and what perf/ measures runs and is told."""
 
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import uuv_marl
-from uuv_marl import load_scenario
-from uuv_marl.sim.swarm import Swarm
-
-ROOT = Path(__file__).resolve().parent.parent
-PERF = ROOT / "perf"
+from tests.processes import ROOT
+from tests.swarms import started
 
 LEAST_SHARE = {"core 54 x 1": 0.005, "core 54 x 64": 0.006, "core 500 x 1": 0.014, "vector_env 54 x 64": 0.006}
 """Pairs per second in a step over those of an empty pair loop, best of several rounds of each, by API, vehicles and
@@ -20,23 +15,11 @@ worlds: four tenths of what was measured, since machines differ in how well they
 counted array references and looked at every sub-sector for every pair reached 0.0045, 0.0051, 0.0039 and 0.0049."""
 
 
-@pytest.fixture
-def perf(monkeypatch):
-    """The scripts in perf/ by name; they import each other by name."""
-    monkeypatch.syspath_prepend(PERF)
-    before = set(sys.modules)
-    yield __import__
-    for name in set(sys.modules) - before:
-        if (PERF / f"{name}.py").exists():
-            del sys.modules[name]
-
-
 def stepped(api, agents, worlds):
     """A case's step as a loop, and the pairs in one step."""
     action = np.random.default_rng(0).uniform(-1.0, 1.0, (worlds, agents, 2)).astype(np.float32)
     if api == "core":
-        swarm = Swarm(load_scenario("single_obstacle", num_vehicles=agents), worlds)
-        swarm.reset(0)
+        swarm = started("single_obstacle", worlds=worlds, n=agents)
     else:
         swarm = uuv_marl.vector_env(worlds, num_vehicles=agents)
         swarm.reset(seed=0)
@@ -68,8 +51,11 @@ def best_rates(loops, rounds, seconds):
 
 
 @pytest.mark.parametrize("name", LEAST_SHARE)
-def test_a_step_keeps_its_share_of_the_pair_loop(perf, name):
+def test_a_step_keeps_its_share_of_the_pair_loop(name, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "perf")
+    import floor
+
     api, agents, _, worlds = name.split()
     size = int(agents), int(worlds)
-    step, loop = best_rates([stepped(api, *size), perf("floor").loop("pairs", *size)], 7, 0.05)
+    step, loop = best_rates([stepped(api, *size), floor.loop("pairs", *size)], 7, 0.05)
     assert step / loop >= LEAST_SHARE[name]

@@ -20,12 +20,8 @@ def seven():
 
 
 def timed(scenario, control_step_s, steps=1):
-    overrides = {
-        "control_step_s": control_step_s,
-        "integration_step_s": control_step_s / steps,
-        "decision_period_s": control_step_s,
-    }
-    return load_scenario(scenario, overrides={f"timing.{clock}": value for clock, value in overrides.items()})
+    clocks = dict.fromkeys(("timing.control_step_s", "timing.decision_period_s"), control_step_s)
+    return load_scenario(scenario, overrides=clocks | {"timing.integration_step_s": control_step_s / steps})
 
 
 def placed(scenario, found, worlds=1):

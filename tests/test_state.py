@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uuv_marl import load_scenario
+from tests.swarms import batched
 from uuv_marl.baselines import make_policy
-from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.scenario.task import task_class
 
 SCENARIOS = {
@@ -21,10 +20,8 @@ FUTURE = {"turn_at", "turn_by", "turns"}
 
 def batch_at(task, reward, steps):
     """A world a few decisions after its start, with some vehicles at their goals and others close to them."""
-    scenario = load_scenario(SCENARIOS[task], num_vehicles=4, overrides={"task.name": task})
-    batch = BatchedEnv(scenario, 1, reward)
-    batch.reset(steps)
-    policy, state = make_policy("random", scenario), batch.swarm.state
+    batch = batched(SCENARIOS[task], {"task.name": task}, seed=steps, n=4, reward=reward)
+    policy, state = make_policy("random", batch.swarm.scenario), batch.swarm.state
     policy.reset(0)
     if task != "silent_targets":
         rank = np.arange(4.0)[:, None]
@@ -64,14 +61,8 @@ def test_a_memory_that_changes_the_coming_reward_changes_the_state(task, reward,
 
 @pytest.mark.parametrize("task", SCENARIOS)
 def test_the_channel_episode_shows_what_was_paid_and_what_time_is_left(task):
-    overrides = {
-        "task.name": task,
-        "sonar.channels": ["episode"],
-        "time_limit.extra_s": 3.0,
-        "time_limit.factor": 0.001,
-    }
-    batch = BatchedEnv(load_scenario(SCENARIOS[task], num_vehicles=4, overrides=overrides))
-    batch.reset(0)
+    brief = {"time_limit.extra_s": 3.0, "time_limit.factor": 0.001}
+    batch = batched(SCENARIOS[task], {"task.name": task, "sonar.channels": ["episode"], **brief}, n=4)
     left = []
     while not batch.over[0]:
         percept = batch.swarm.percept
@@ -84,8 +75,7 @@ def test_the_channel_episode_shows_what_was_paid_and_what_time_is_left(task):
 
 
 def test_an_identity_is_the_vehicles_own_and_constant():
-    batch = BatchedEnv(load_scenario("starter", overrides={"sonar.channels": ["identity"]}), 2)
-    batch.reset(0)
+    batch = batched("starter", {"sonar.channels": ["identity"]}, 2)
     for _ in range(3):
         assert batch.swarm.percept["identity"][:, :, 0] == pytest.approx(np.tile([0.1, 0.3, 0.5, 0.7, 0.9], (2, 1)))
         batch.step(np.ones((2, 5, 2)))

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 import uuv_marl
-from tests.swarms import run_of, started
-from uuv_marl import load_scenario
+from tests.swarms import batched, run_of, started
 from uuv_marl.benchmark.success import CENTRE_M, GRACE_S, SuccessRecorder
-from uuv_marl.envs.core import BatchedEnv
 
 SPREAD_M = 80.0
+LONG = {"arrival.ends_episode": False, "time_limit.factor": 1.0, "time_limit.extra_s": GRACE_S}
 WORLD = np.ones(1, np.bool_)
 
 
@@ -129,9 +128,6 @@ def test_lost_vehicles_are_excused_unless_a_collision_lost_them():
     assert (end["success_share"], end["vehicles_faulty"]) == (None, 3)
 
 
-LONG = {"arrival.ends_episode": False, "time_limit.factor": 1.0, "time_limit.extra_s": GRACE_S}
-
-
 def test_an_episode_that_arrival_does_not_end_goes_on_as_it_was():
     """The same run to arrival, with the same arrival, and then to the time limit."""
     short, long = (run_of("bio_inspired_plus", "starter", changes, 3) for changes in ({}, LONG))
@@ -146,8 +142,7 @@ def test_an_episode_that_arrival_does_not_end_goes_on_as_it_was():
 def test_arrival_is_rewarded_once_and_is_in_the_last_info():
     quick = {**LONG, "trajectory.speed_mps": 40.0, "arrival.radius_m": 5e3, "arrival.spread_m": 2e4}
     quick |= {"time_limit.extra_s": 6.0, "timing.decision_period_s": 0.5, "arrival.dwell_s": 0.7}
-    batch = BatchedEnv(load_scenario("starter", overrides=quick))
-    batch.reset(0)
+    batch = batched("starter", quick)
     rewards = []
     while not batch.over.all():
         result = batch.step(np.zeros((1, 5, 2), np.float32))

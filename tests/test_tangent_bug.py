@@ -16,12 +16,10 @@ POCKET = [(110.0, float(y)) for y in range(-40, 31, 10)] + [(float(x), y) for x 
 def water(walls, surface=False, side=1.0):
     """One vehicle at (5, 4), its bow to the goal, which is at rest behind walls of discs of 7 m."""
     changes = {
-        "task": {"name": "reach", "near_m": 10.0},
-        "obstacles": [{"centre_m": [x, side * y], "radius_m": 7.0} for x, y in walls],
-        "trajectory.waypoints_m": [[0.0, 0.0], [GOAL_M, 0.0]],
-        "collision.stops": True,
+        "task": {"name": "reach", "near_m": 10.0}, "trajectory.waypoints_m": [[0.0, 0.0], [GOAL_M, 0.0]],
+        "obstacles": [{"centre_m": [x, side * y], "radius_m": 7.0} for x, y in walls], "collision.stops": True,
         "sonar.echo_reports": "surface" if surface else "centre",
-    }
+    }  # fmt: skip
     return load_scenario("starter", num_vehicles=1, overrides=changes)
 
 

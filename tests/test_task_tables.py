@@ -1,7 +1,5 @@
 """Research on tasks: what is run, the page by hand, a blind policy, and the shipped pages from the shipped rows."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -9,12 +7,13 @@ from research.blind import Blind
 from research.episodes import read_rows
 from research.tasks.page import report
 from research.tasks.studies import STUDIES, set_name
+from tests.processes import ROOT
 from tests.swarms import fly, piloted
 from uuv_marl import load_scenario
 from uuv_marl.percept import Percept
 from uuv_marl.tasks.maps.kinds import KINDS
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
+DOCS = ROOT / "docs"
 STUDY = STUDIES["hard_water"]
 
 

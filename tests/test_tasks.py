@@ -3,14 +3,13 @@
 import json
 import re
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import uuv_marl
-from tests.processes import cli, python
-from tests.swarms import run_of, started
+from tests.processes import ROOT, python, succeeds
+from tests.swarms import batched, run_of, started
 from uuv_marl import load_scenario
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import episodes
@@ -24,8 +23,6 @@ from uuv_marl.tasks import Follow, Task
 from uuv_marl.tasks.measures import MEASURED
 
 EXAMPLE = "examples.extending.task:Rendezvous"
-
-
 DRAWS = """
 import hashlib, uuv_marl
 for name in ("few_informed", "hard_water", "two_swarms", "silent_targets", "random_field"):
@@ -38,7 +35,7 @@ for name in ("few_informed", "hard_water", "two_swarms", "silent_targets", "rand
 def test_draws_do_not_depend_on_the_processor_s_own_instructions():
     """Matrix products, and NumPy's functions, are other code on processors without them."""
     older = {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
-    now, before = (python(DRAWS, PYTHONWARNINGS="ignore", **more) for more in ({}, older))
+    now, before = (python("-c", DRAWS, PYTHONWARNINGS="ignore", **more) for more in ({}, older))
     assert len(now.splitlines()) == 5
     assert now == before
 
@@ -91,13 +88,9 @@ class TwoWays(Survive):
 
     def draw(self, world, rng):
         drawn = default_setup(self.swarm.scenario, rng)
-        n = len(drawn.eta)
-        return drawn._replace(
-            waypoints=(drawn.waypoints[0], drawn.waypoints[0] * [1.0, -1.0]),
-            times=2 * drawn.times,
-            group=(np.arange(n) % 2).astype(np.int64),
-            informed=np.arange(n) > 1,
-        )
+        rank, way = np.arange(len(drawn.eta)), drawn.waypoints[0]
+        mirrored = {"waypoints": (way, way * [1.0, -1.0]), "times": 2 * drawn.times}
+        return drawn._replace(group=(rank % 2).astype(np.int64), informed=rank > 1, **mirrored)
 
 
 class Endless(Survive):
@@ -149,8 +142,7 @@ def test_an_arrival_of_groups_is_that_of_all():
 
 
 def test_at_a_goal_at_rest_who_touched_something_has_failed():
-    batch = BatchedEnv(load_scenario("starter", overrides={"task": {"name": "reach", "near_m": 30.0}}))
-    batch.reset(0)
+    batch = batched("starter", {"task": {"name": "reach", "near_m": 30.0}})
     swarm, goal = batch.swarm, batch.swarm.world_map.waypoints[0, 0, -1]
     assert (swarm.facts.reference[0, 0] == [*goal, 0.0, 0.0]).all()
     swarm.state.eta[0, :, :2] = goal + 7.0 * np.stack([np.arange(5), np.zeros(5)], axis=1)
@@ -221,9 +213,8 @@ def test_numbers_that_a_task_needs_are_missed_when_a_swarm_is_made():
 
 
 def test_a_reward_that_a_task_does_not_know_or_does_not_give_is_refused():
-    with pytest.raises(
-        ValueError, match="reward must be 'dense', 'first_arrival', 'team' or a function of the swarm, got 'sparse'"
-    ):
+    message = "reward must be 'dense', 'first_arrival', 'team' or a function of the swarm, got 'sparse'"
+    with pytest.raises(ValueError, match=message):
         uuv_marl.parallel_env("starter", task="reach", reward="sparse")
     env = uuv_marl.parallel_env("starter", task=f"{__name__}:Broken")
     env.reset(seed=0)
@@ -242,9 +233,7 @@ class Still(Follow):
 
 
 def test_a_subclass_of_follow_may_have_its_own_reward():
-    batch, usual = (BatchedEnv(load_scenario("starter", overrides=own)) for own in ({"task": f"{__name__}:Still"}, {}))
-    for env in (batch, usual):
-        env.reset(0)
+    batch, usual = (batched("starter", own) for own in ({"task": f"{__name__}:Still"}, {}))
     result, expected = (env.step(np.ones((1, 5, 2))) for env in (batch, usual))
     np.testing.assert_array_equal(result.terms["tracking"], expected.terms["tracking"])
     np.testing.assert_array_equal(result.reward, sum(result.terms.values()))
@@ -269,7 +258,7 @@ def test_where_clocks_are_fixed_everybody_has_them_unless_the_row_says_so():
 
 @pytest.fixture
 def in_example_folder(monkeypatch):
-    monkeypatch.chdir(Path(__file__).resolve().parent.parent / "examples" / "extending")
+    monkeypatch.chdir(ROOT / "examples" / "extending")
     monkeypatch.setattr(sys, "path", [*sys.path])
     yield
     sys.modules.pop("task", None)
@@ -277,7 +266,7 @@ def in_example_folder(monkeypatch):
 
 def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path, in_example_folder):
     how = ["--scenario", "starter", "--set", "task=task:Rendezvous", "--policy", "random"]
-    assert cli("benchmark", *how, "--seeds", 2, "--output", tmp_path / "out")[0] == 0
+    succeeds("benchmark", *how, "--seeds", 2, "--output", tmp_path / "out")
     runs = json.loads((tmp_path / "out" / "results.json").read_text())["runs"]
     assert all(set(run["metrics"]["task"]) == {"success_share", "swarm_success", "spread_m"} for run in runs)
     text = (tmp_path / "out" / "table.md").read_text()
@@ -287,7 +276,7 @@ def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path,
     np.testing.assert_array_equal(frame["spread_m"], [run["metrics"]["task"]["spread_m"] for run in runs])
     assert {*frame.columns} <= {"spread_m", "success_share", "swarm_success", *MEASURED}
     assert _outcome(runs[0]["metrics"]).startswith("success 0%, ")
-    assert cli("replay", *how, "--output", tmp_path / "replay.html")[0] == 0
+    succeeds("replay", *how, "--output", tmp_path / "replay.html")
     assert (tmp_path / "replay.html").stat().st_size > 10_000
 
 

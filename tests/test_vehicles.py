@@ -15,6 +15,7 @@ from uuv_marl.benchmark import handling
 from uuv_marl.scenario import ScenarioError, load_vehicle, show_vehicle, to_toml, vehicle_names
 from uuv_marl.scenario.turning import turning_radius
 
+HEAVY = "\n[variants.heavy.vehicle]\n"
 SLOW = {"trajectory.speed_mps": 1.0, "start.speed_max_mps": 1.0, "timing.integration_step_s": 0.0125}
 
 
@@ -57,13 +58,11 @@ class Lauv:
 
     @staticmethod
     def damping(u, v, r):
-        return np.array(
-            [
+        return np.array([
                 [-2.4 - 2.4 * abs(u), 0.0, 0.0],
                 [0.0, -23.0 - 80.0 * abs(v), 11.5 + 0.3 * abs(r)],
                 [0.0, -3.1 - 1.5 * abs(v), -9.7 - 9.1 * abs(r)],
-            ]
-        ) + u * np.array([[0.0, 0.0, 0.0], [0.0, -30.16, 7.68], [0.0, 10.99, -3.07]])
+        ]) + u * np.array([[0.0, 0.0, 0.0], [0.0, -30.16, 7.68], [0.0, 10.99, -3.07]])  # fmt: skip
 
 
 class Remus:
@@ -75,9 +74,9 @@ class Remus:
 
     @staticmethod
     def damping(u, v, r):
-        return np.array(
-            [[-6.11 * abs(u), 0.0, 0.0], [0.0, -1310.0 * abs(v), 0.632 * abs(r)], [0.0, -3.18 * abs(v), -94.0 * abs(r)]]
-        ) + u * np.array([[0.0, 0.0, 0.0], [0.0, -28.6, 6.15], [0.0, 10.57, -3.93]])
+        return np.array([
+            [-6.11 * abs(u), 0.0, 0.0], [0.0, -1310.0 * abs(v), 0.632 * abs(r)], [0.0, -3.18 * abs(v), -94.0 * abs(r)]
+        ]) + u * np.array([[0.0, 0.0, 0.0], [0.0, -28.6, 6.15], [0.0, 10.57, -3.93]])  # fmt: skip
 
 
 def fossen(source, asked):
@@ -148,12 +147,7 @@ def test_a_file_of_ones_own_has_variants_too(tmp_path):
     assert load_scenario(tmp_path / "course.toml").vehicle == heavy.vehicle
 
 
-HEAVY = "\n[variants.heavy.vehicle]\n"
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "name", "message"),
-    [
+@pytest.mark.parametrize(("before", "after", "name", "message"), [
         (r"\Z", f"{HEAVY}m_kg = 25.0", "+havy", "has no variant 'havy'; it has heavy"),
         (r"\Z", "\n[variants.heavy]\nm_kg = 25.0", "+heavy", "holds 'm_kg'; it may hold vehicle and actuators only"),
         (r"\Z", f"{HEAVY}mass = 25.0", "+heavy", "vehicle.mass is unknown"),
@@ -161,8 +155,7 @@ HEAVY = "\n[variants.heavy.vehicle]\n"
         ("^lever_arm_m = .*", "", "", "lacks actuators.lever_arm_m"),
         (r"^\[vehicle\]", "[swarm]\nnum_vehicles = 3\n[vehicle]", "", "may hold vehicle and actuators only"),
         ("^m_kg = .*", "m_kg = ", "", "is not valid TOML"),
-    ],
-)
+])  # fmt: skip
 def test_a_vehicle_file_that_is_not_complete_or_lacks_a_variant_is_refused(before, after, name, message, tmp_path):
     own, (text, changes) = tmp_path / "mine.toml", re.subn(before, after, show_vehicle("lauv"), count=1, flags=re.M)
     assert changes == 1

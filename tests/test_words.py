@@ -2,11 +2,11 @@
 
 import ast
 import re
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+from tests.processes import ROOT
+
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
 SAID = ("log", "say", "echo", "print", "secho")
 """Functions whose texts a user reads, beside those of errors and ``help=``."""
@@ -92,27 +92,22 @@ def test_messages_use_the_terms_of_the_field():
 
 
 @pytest.mark.docs
-@pytest.mark.parametrize(
-    "text",
-    [
-        "Vehicles move in water_velocity under a control law.", "There is no obstacle.", "Is there a way to stop?",
-        "Vehicles whose goals lie in sea water drift.",
-        "Of course, the collision course is stable.", "It is no longer needed; it is no faster than NumPy.",
-        "Contact the maintainers, who are volunteers.", "The way that a policy acts is fixed.",
-        "What is there to see?", "We recommend amendments.", "A force beyond the limit is clipped.",
-        "Who is it for?", "People who train policies start here.",
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("text", [
+    "Vehicles move in water_velocity under a control law.", "There is no obstacle.", "Is there a way to stop?",
+    "Vehicles whose goals lie in sea water drift.", "What is there to see?", "We recommend amendments.",
+    "Of course, the collision course is stable.", "It is no longer needed; it is no faster than NumPy.",
+    "Contact the maintainers, who are volunteers.", "The way that a policy acts is fixed.",
+    "A force beyond the limit is clipped.", "Who is it for?", "People who train policies start here.",
+])  # fmt: skip
 def test_plain_english_is_not_refused(text):
     assert private(text) == []
 
 
 @pytest.mark.docs
-@pytest.mark.parametrize(
-    "text",
-    ["the best law", "a vehicle who hears nobody", "The swarm was whole.", "Each contact costs.", "policies at sea",
-     "the sampled course", "it is paid for arriving", "vehicles that are there", "a file is no TOML", "mend it"],
-)  # fmt: skip
+@pytest.mark.parametrize("text", [
+    "the best law", "a vehicle who hears nobody", "The swarm was whole.", "Each contact costs.", "policies at sea",
+    "the sampled course", "it is paid for arriving", "vehicles that are there", "a file is no TOML", "mend it",
+])  # fmt: skip
 def test_private_senses_are_found(text):
     assert private(text)
 

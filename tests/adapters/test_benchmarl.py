@@ -2,12 +2,12 @@
 
 import re
 import warnings
-from pathlib import Path
 
 import pytest
 import torch
 
 from tests import contract
+from tests.processes import page_block
 from uuv_marl.scenario import ScenarioError, load_scenario, scenario_names
 
 # Others' own: BenchMARL, TorchRL and torch deprecate parts of each other.
@@ -102,9 +102,6 @@ def test_the_contract_holds_with_this_torchrl(case):
 
 def test_the_pages_example_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    page = Path(__file__).resolve().parents[2] / "docs" / "interfaces.md"
-    blocks = re.findall(r"```python\n(.*?)```", page.read_text(), flags=re.S)
-    (block,) = [block for block in blocks if "from benchmarl." in block]
-    block, count = re.subn(r"max_n_iters, config.lr = \d+", "max_n_iters, config.lr = 1", block)
+    block, count = re.subn(r"max_n_iters, config.lr = \d+", "max_n_iters, config.lr = 1", page_block("benchmarl"))
     assert count == 1
-    exec(compile(block, page.name, "exec"), {"__name__": "example"})
+    exec(block, {"__name__": "example"})

@@ -1,7 +1,6 @@
 """The comparison of learners: every trainer keeps its budget and leaves a policy, and the page is that of its rows."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,13 +15,14 @@ from research.learners.layout import marl_eval
 from research.learners.protocol import LEARNERS, TASKS
 from research.learners.squashed import Squashed
 from research.learners.statistics import improvement, interquartile_mean
+from tests.processes import ROOT
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
 from uuv_marl.sim.observation import observation_layout, observer
 from uuv_marl.sim.swarm import Swarm
 
 pytestmark = pytest.mark.filterwarnings("ignore")
-FOLDER = Path(__file__).resolve().parents[2]
+SHIPPED = ROOT / "research" / "learners" / "curves.csv.gz", ROOT / "docs" / "learners.csv.gz"
 
 
 def quiet(_):
@@ -149,15 +149,13 @@ def test_the_page_shows_the_trainings_that_all_learners_have():
 
 
 def test_the_shipped_page_and_file_are_made_of_the_shipped_rows():
-    files = ("research/learners/curves.csv.gz", "docs/learners.csv.gz")
-    curves, rows = (read_rows(FOLDER / file) for file in files)
-    assert (FOLDER / "docs" / "learners.md").read_text() == page.report(curves, rows)
-    assert json.loads((FOLDER / "docs" / "learners_marl_eval.json").read_text()) == marl_eval(curves, rows)
+    curves, rows = map(read_rows, SHIPPED)
+    assert (ROOT / "docs" / "learners.md").read_text() == page.report(curves, rows)
+    assert json.loads((ROOT / "docs" / "learners_marl_eval.json").read_text()) == marl_eval(curves, rows)
 
 
 def test_what_the_page_finds_is_in_the_shipped_rows():
-    files = ("research/learners/curves.csv.gz", "docs/learners.csv.gz")
-    curves, rows = page.complete(*(read_rows(FOLDER / file) for file in files))
+    curves, rows = page.complete(*map(read_rows, SHIPPED))
     found = page.by_training(rows)
     every = page.scores(found)
     laws = {name: float(page._values(found, name, task.policies[0])[0, 0]) for name, task in TASKS.items()}
@@ -215,7 +213,7 @@ def test_the_layout_is_that_of_marl_eval():
 
 def test_all_learners_have_one_axis():
     """Marl-eval draws steps over one interval, the mean of all differences of step counts, the first from 0."""
-    told = json.loads((FOLDER / "docs" / "learners_marl_eval.json").read_text())["uuv_marl"]
+    told = json.loads((ROOT / "docs" / "learners_marl_eval.json").read_text())["uuv_marl"]
     every = [run for task in told.values() for runs in task.values() for run in runs.values()]
     counts = {tuple(step["step_count"] for key, step in run.items() if key.startswith("step_")) for run in every}
     assert len(counts) == 1
@@ -264,6 +262,6 @@ def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
 @pytest.mark.parametrize("name", LEARNERS)
 def test_a_learner_has_the_best_of_the_settings_that_were_tried(name):
     learner = LEARNERS[name]
-    rows = [row for row in read_rows(FOLDER / "research" / "learners" / "trials.csv") if row["learner"] == name]
+    rows = [row for row in read_rows(ROOT / "research" / "learners" / "trials.csv") if row["learner"] == name]
     assert [json.loads(row["settings"]) for row in rows] == list(learner.tried)
     assert learner.chosen == np.argmax([float(row["score"]) for row in rows])

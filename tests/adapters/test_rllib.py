@@ -1,10 +1,7 @@
 """RLlib: the same environment bit for bit, and its example."""
 
 import os
-import subprocess
-import sys
 import warnings
-from pathlib import Path
 
 # Before imports, as in the example: Ray stays on 127.0.0.1 and reports nothing to anybody; a process has one core.
 os.environ["NUMBA_NUM_THREADS"] = "1"
@@ -22,10 +19,9 @@ with warnings.catch_warnings():
 
 import uuv_marl
 from tests import contract
-from tests.processes import module_of
+from tests.processes import ROOT, module_of, page_block, python
 from uuv_marl.envs.rllib import ENV_NAME, SwarmMultiAgentEnv, register
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 SHORT = {"time_limit.factor": 0.01, "time_limit.extra_s": 4.0}
 LOSSY = {"scenario": "lossy", "num_vehicles": 5, "overrides": {**SHORT, **contract.LOSES}}
 EXAMPLE = ROOT / "examples" / "training" / "rllib.py"
@@ -84,9 +80,7 @@ def play(env, seed=0):
 
 
 def test_a_lost_vehicle_leaves_alone_and_the_time_limit_truncates_the_others():
-    outcomes = play(
-        SwarmMultiAgentEnv({"scenario": "lossy", "num_vehicles": 5, "overrides": {**SHORT, **contract.LOSES}})
-    )
+    outcomes = play(SwarmMultiAgentEnv(LOSSY))
     lost = [[agent for agent, flag in outcome[3].items() if flag] for outcome in outcomes]
     times = [t for t, names in enumerate(lost) for _ in names]
     assert len(times) == 2
@@ -117,9 +111,7 @@ def test_rllib_bootstraps_at_the_time_limit_and_not_after_a_loss():
     episode = MultiAgentEpisode(agent_to_module_mapping_fn=lambda *_: "shared")
     episode.add_env_reset(observations=env.reset(seed=0)[0])
     for actions, observations, rewards, terminateds, truncateds, infos in play(env):
-        episode.add_env_step(
-            observations, actions, rewards, infos, terminateds=terminateds, truncateds=truncateds
-        )  # fmt: skip
+        episode.add_env_step(observations, actions, rewards, infos, terminateds=terminateds, truncateds=truncateds)
     ends = [(one.is_terminated, one.is_truncated) for one in episode.agent_episodes.values()]
     assert sorted(ends) == [(False, True)] * 3 + [(True, False)] * 2
     assert (episode.is_terminated, episode.is_truncated) == (False, True)
@@ -190,23 +182,15 @@ def test_every_runner_starts_from_its_own_world(started):
 
 
 def test_the_example_trains_and_goes_on(tmp_path):
-    command = [sys.executable, EXAMPLE, "--scenario=starter", "--steps=100", "--runners=1", f"--output={tmp_path}"]
+    command = [EXAMPLE, "--scenario=starter", "--steps=100", "--runners=1", f"--output={tmp_path}"]
     for more in ([], ["--resume"]):
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        done = subprocess.run([*command, *more], env=environment, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-        assert "agent-steps, return of all vehicles" in done.stdout
-        assert f"The checkpoint is in {tmp_path}." in done.stdout
+        said = python(*command, *more, PYTHONPATH=str(ROOT))
+        assert "agent-steps, return of all vehicles" in said
+        assert f"The checkpoint is in {tmp_path}." in said
 
 
 def test_the_example_of_the_page_runs(tmp_path):
-    page = (ROOT / "docs" / "interfaces.md").read_text()
-    blocks = [part.split("```")[0] for part in page.split("```python\n")[1:]]
-    (block,) = [block for block in blocks if "from ray.rllib." in block]
+    block = page_block("ray.rllib")
     assert block.count("range(50)") == 1
     block = block.replace("range(50)", "range(1)").replace("16_384", "4_096")
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", block], env=environment, cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+    python("-c", block, folder=tmp_path, PYTHONPATH=str(ROOT))

@@ -13,11 +13,10 @@ import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 from tests.attacks import crashes, inputs
+from tests.processes import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 OUTCOMES = ("accepted", "refused", "unclear", "wrong", "memory", "crash", "hang")
 HANG_S, START_S = 60.0, 1200.0  # what cases need is compiled at the start
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+from tests.processes import ROOT
 
 BENCHMARK = """
 from uuv_marl.cli import app

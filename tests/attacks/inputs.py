@@ -18,7 +18,7 @@ from gymnasium.error import ResetNeeded
 import uuv_marl
 from tests.nets import ANYWHERE
 from tests.players import CYCLES, PLAYERS, compare, suited
-from tests.processes import cli
+from tests.processes import cli, succeeds
 from tests.swarms import fly, piloted, started
 from uuv_marl import load_scenario, scenario_names
 from uuv_marl.baselines import POLICIES, make_policy, with_policy_requirements
@@ -103,10 +103,9 @@ def fields(rng, folder):
 def scenarios_that_run(rng, folder):
     """What was accepted must work: a few decisions of an environment and of a policy, finite and within bounds."""
     scenario = changed_scenario(rng, 2)
-    if (
-        scenario.swarm.num_vehicles > 60
-        or scenario.timing.control_steps_per_decision * scenario.timing.integration_steps_per_control_step > 2000
-    ):
+    timing = scenario.timing
+    steps = timing.control_steps_per_decision * timing.integration_steps_per_control_step
+    if scenario.swarm.num_vehicles > 60 or steps > 2000:
         return
     env = uuv_marl.parallel_env(scenario, max_cycles=12)
     observations, _ = env.reset(seed=int(rng.integers(10**6)))
@@ -250,23 +249,17 @@ def call_sequences(rng, folder):
         env = uuv_marl.parallel_env("starter", 2, max_cycles=4, render_mode=pick(rng, (None, "rgb_array")))
         act = lambda: {agent: [0.1, 0.2] for agent in pick(rng, (env.agents, env.possible_agents, []))}  # noqa: E731
     elif kind == 1:
-        env = uuv_marl.vector_env(
-            2, "starter", num_vehicles=2, max_cycles=4, autoreset_mode=pick(rng, ("NextStep", "SameStep", "Disabled"))
-        )
+        mode = pick(rng, ("NextStep", "SameStep", "Disabled"))
+        env = uuv_marl.vector_env(2, "starter", num_vehicles=2, max_cycles=4, autoreset_mode=mode)
         act = lambda: np.zeros((2, 2, 2), np.float32)  # noqa: E731
     else:
         env = uuv_marl.env("starter", 2, max_cycles=3)
         act = lambda: pick(rng, (None, np.zeros(2, np.float32)))  # noqa: E731
     calls = (
         lambda: env.reset(seed=pick(rng, (None, 0, 5))),
-        lambda: env.step(act()),
-        lambda: env.step(act()),
-        lambda: env.step(act()),
-        env.state,
-        env.render,
+        *[lambda: env.step(act())] * 3,
         lambda: copy.deepcopy(env),
-        env.close,
-        getattr(env, "last", list),
+        *(env.state, env.render, env.close, getattr(env, "last", list)),
     )
     for _ in range(12):
         try:
@@ -414,8 +407,7 @@ def prepare(folder):
     """Make what the cases start from, and compile what they need, so that their time limit is for them alone."""
     global SOURCE_RESULTS  # noqa: PLW0603
     SOURCE_RESULTS = folder / "source"
-    words = ["--scenario", "starter", "--policy", "idle", "--seeds", "2", "--output", SOURCE_RESULTS]
-    assert cli("benchmark", *words)[0] == 0
+    succeeds("benchmark", "--scenario=starter", "--policy=idle", "--seeds=2", f"--output={SOURCE_RESULTS}")
     for name in POLICIES:
         fly(*piloted(name, TASKS_OF.get(name, "single_obstacle")), 1)
     for name in scenario_names():
@@ -456,20 +448,8 @@ def command_line(rng, folder):
 
 
 COUNTS = {
-    fields: 1200,
-    scenarios_that_run: 400,
-    toml_bytes: 700,
-    toml_by_hand: 150,
-    overrides: 700,
-    odd_arguments: 300,
-    actions: 300,
-    call_sequences: 150,
-    foreign_percepts: 200,
-    snapshots: 200,
-    states_by_hand: 150,
-    checkpoints: 400,
-    results_folders: 200,
-    command_line: 150,
-    interfaces: 28,
-}
+    fields: 1200, scenarios_that_run: 400, toml_bytes: 700, toml_by_hand: 150, overrides: 700, odd_arguments: 300,
+    actions: 300, call_sequences: 150, foreign_percepts: 200, snapshots: 200, states_by_hand: 150, checkpoints: 400,
+    results_folders: 200, command_line: 150, interfaces: 28,
+}  # fmt: skip
 """Kinds of inputs, and how many cases of each the campaign has."""

@@ -17,13 +17,11 @@ def matrices(scenario, nu):
     a, b = p.Y_vdot_kg * v + p.Y_rdot_kgm * r, p.X_udot_kg * u
     c_a = np.array([[0, 0, a], [0, 0, -b], [-a, b, 0]])
     d_l = np.array([[p.X_u, 0, 0], [0, p.Y_v, -p.Y_r], [0, -p.N_v, p.N_r]])
-    d_nl = np.array(
-        [
-            [p.X_uu * abs(u), 0, 0],
-            [0, p.Y_vv * abs(v), -p.Y_rr * abs(r)],
-            [0, -p.N_rv * abs(r) - p.N_vv * abs(v), p.N_rr * abs(r)],
-        ]
-    )
+    d_nl = np.array([
+        [p.X_uu * abs(u), 0, 0],
+        [0, p.Y_vv * abs(v), -p.Y_rr * abs(r)],
+        [0, -p.N_rv * abs(r) - p.N_vv * abs(v), p.N_rr * abs(r)],
+    ])  # fmt: skip
     lift = max(u, 0.0) * np.array([[0, 0, 0], [0, p.Y_uv, p.Y_ur], [0, p.N_uv, p.N_ur]])
     return m_rb + m_a, c_rb + on * c_a, d_l + d_nl - lift
 

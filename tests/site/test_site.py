@@ -2,7 +2,6 @@
 
 import re
 from importlib.util import find_spec
-from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote
 
@@ -10,10 +9,10 @@ import pytest
 from bs4 import BeautifulSoup
 from sphinx.util.inventory import InventoryFile
 
+from tests.processes import ROOT
 from tests.test_docs import PAGES
 from tests.test_replay_page import CHROMIUM, browse
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 SITE = ROOT / "build" / "site"
 SHOWN = [*PAGES, ROOT / "CHANGELOG.md", *sorted((ROOT / "perf").glob("*.md"))]
 """The Markdown that becomes pages."""

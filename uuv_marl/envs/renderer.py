@@ -39,18 +39,18 @@ class Renderer:
         self._memory = SceneHistory(swarm)
         self._shown: Any = None
 
-    def draw(self, world: int = 0) -> NDArray[np.uint8] | None:
+    def draw_frame(self, world: int = 0) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
         if self.mode is None:
             raise RuntimeError("render() needs a render_mode: make the environment with render_mode='rgb_array'")
         self._memory.note()
         if self.mode == "human":
             return self._window().show(self._memory.scene, wait=False)
-        from uuv_marl.envs.drawing.frame import Panel, draw, pixels  # noqa: PLC0415
+        from uuv_marl.envs.drawing.frame import Panel, draw_frame, pixels  # noqa: PLC0415
 
         name, scene = self._swarm.scenario.name, self._memory.scene(self._look.sonar_of, world)
         title = name if self._swarm.num_worlds == 1 else f"{name}, world {world}"
-        return pixels(draw([Panel(title, scene)], self._look.size, self._look.camera))
+        return pixels(draw_frame([Panel(title, scene)], self._look.size, self._look.camera))
 
     def update(self) -> None:
         """Record the worlds after a reset or a step, and draw them in the window, if there is one."""

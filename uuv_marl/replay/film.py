@@ -13,7 +13,7 @@ from PIL import Image
 from uuv_marl.atomic import replacing, writing
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import CAMERAS
-from uuv_marl.envs.drawing.frame import Panel, draw, pixels
+from uuv_marl.envs.drawing.frame import Panel, draw_frame, pixels
 from uuv_marl.errors import ReplayError
 from uuv_marl.extras import extra
 from uuv_marl.paths import UserPath, user_path
@@ -74,7 +74,7 @@ def write_film(
             moments = np.linspace(0.0, longest, _MOMENTS).tolist()
             scenes = [(one, one.scene_at(now, sonar_of), now) for one in recordings for now in moments]
             panels = [Panel(f"{one.policy} at {scene.time_s:.0f} s", scene, now) for one, scene, now in scenes]
-            still = pixels(draw(panels, size, camera, heading, columns=_MOMENTS))
+            still = pixels(draw_frame(panels, size, camera, heading, columns=_MOMENTS))
             Image.fromarray(still).save(partial, optimize=True)
             return
         is_gif, fps, speed = suffix == ".gif", _FPS[suffix], speed or max(1.0, round(longest / _LENGTH_S[suffix]))
@@ -88,7 +88,7 @@ def write_film(
                     Panel(one.policy, scene._replace(trail=[]) if is_gif else scene)
                     for one, scene in zip(recordings, scenes, strict=True)
                 ]
-                yield pixels(draw(panels, size, camera, heading, columns=len(panels), grid=not is_gif))
+                yield pixels(draw_frame(panels, size, camera, heading, columns=len(panels), grid=not is_gif))
                 if progress:
                     progress((k + 1) / num)
 

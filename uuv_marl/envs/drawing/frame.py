@@ -29,7 +29,7 @@ class Panel(NamedTuple):
     """Panels with the same clock share a view."""
 
 
-def draw(
+def draw_frame(
     panels: Sequence[Panel], size: tuple[int, int], camera: str, heading: str = "", *,
     columns: int = 1, grid: bool = True,
 ) -> pygame.Surface:  # fmt: skip

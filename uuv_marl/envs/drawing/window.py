@@ -8,7 +8,7 @@ from weakref import WeakSet
 
 from uuv_marl.envs.drawing import ink
 from uuv_marl.envs.drawing.camera import CAMERAS
-from uuv_marl.envs.drawing.frame import Panel, draw
+from uuv_marl.envs.drawing.frame import Panel, draw_frame
 from uuv_marl.envs.drawing.options import Look
 from uuv_marl.envs.drawing.scene import Scene
 from uuv_marl.extras import extra
@@ -95,7 +95,7 @@ class Window:
 
     def _draw(self, shown: pygame.Surface, scene: Scene) -> None:
         width, height = shown.get_size()
-        shown.blit(draw([Panel(self._name, scene)], (width, height - _KEYS_PX), self._camera), (0, 0))
+        shown.blit(draw_frame([Panel(self._name, scene)], (width, height - _KEYS_PX), self._camera), (0, 0))
         shown.fill(ink.TEXT, (0, height - _KEYS_PX, width, _KEYS_PX))
         inspected = "no vehicle" if self._sonar_of is None else f"vehicle {self._sonar_of}"
         keys = (
