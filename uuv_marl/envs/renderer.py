@@ -39,7 +39,7 @@ class Renderer:
         self._memory = SceneHistory(swarm)
         self._shown: Any = None
 
-    def draw_frame(self, world: int = 0) -> NDArray[np.uint8] | None:
+    def draw(self, world: int = 0) -> NDArray[np.uint8] | None:
         """A picture (height, width, 3) in mode ``rgb_array``; None in mode ``human``, which shows a window."""
         if self.mode is None:
             raise RuntimeError("render() needs a render_mode: make the environment with render_mode='rgb_array'")
