@@ -16,7 +16,7 @@ from uuv_marl.envs.core import BatchedEnv, StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
 from uuv_marl.envs.ending import ending
 from uuv_marl.envs.mixins import RenderMixin
-from uuv_marl.sim.arguments import action_array, world_seeds
+from uuv_marl.sim.arguments import action_array, whole_number, world_seeds
 from uuv_marl.sim.observation import Observe
 from uuv_marl.types import Float32, Int64
 
@@ -61,6 +61,10 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
     def max_cycles(self) -> int | None:
         """Decisions after which an episode is truncated, None for the scenario's time limit."""
         return self._batch.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, value: int | None) -> None:  # as PettingZoo's own test sets it
+        self._batch.max_cycles = None if value is None else whole_number("max_cycles", value, 1)
 
     def observation_space(self, agent: str) -> Space[Any]:
         """The observation space of an agent, always the same object."""
