@@ -30,6 +30,11 @@ MEDIUM = {
 """Everything that can disturb a world, in the middle of its range."""
 SEA = MEDIUM | {"sonar.channels": ["compass", "current", "age", "ranged", "modem"], "modem.loss_probability": 0.1}
 """The same, and all that vehicles can be told of it."""
+TALK = MEDIUM | {
+    "modem.message_entries": 3, "modem.message_vectors": 1, "modem.loss_probability": 0.1, "modem.access": "aloha",
+    "sonar.channels": ["compass", "messages", "odometry"],
+}  # fmt: skip
+"""The same with messages that vehicles choose."""
 SINKING = {"faults": [{"kind": "member", "share": 0.4, "onset_s": 2.0}]}
 BRIEF = {"time_limit.factor": 0.005, "time_limit.extra_s": 4.0}
 OWN_TASK = "examples.extending.task:Rendezvous"
@@ -52,8 +57,9 @@ class Case(NamedTuple):
         return {"num_vehicles": VEHICLES, **own, **self.options}
 
     def actions(self):
-        """Shape (step, world, vehicle, 2)."""
-        return np.random.default_rng(7).uniform(-1, 1, (self.steps, WORLDS, VEHICLES, 2)).astype(np.float32)
+        """Shape (step, world, vehicle, entry)."""
+        shape = (self.steps, WORLDS, VEHICLES, 2 + self.overrides.get("modem.message_entries", 0))
+        return np.random.default_rng(7).uniform(-1, 1, shape).astype(np.float32)
 
 
 class Run(NamedTuple):
@@ -107,6 +113,8 @@ def cases():
         Case("sinks", "single_obstacle", SINKS, 1.0, 350),
         Case("sea", "starter", SEA | TIMES_OUT, 0.5, 60),
         Case("sea-loses", "starter", SEA | TIMES_OUT | SINKING, 0.5, 60),
+        Case("talk-loses", "starter", TALK | TIMES_OUT | SINKING, 0.5, 60),
+        Case("talk", "starter", TALK | TIMES_OUT, 0.5, 60),
         Case("own_period", "random_field", BRIEF, 0.1),
         Case("team_reward", "lossy", TIMES_OUT, options={"reward": "team"}),
         Case("own_reward", "random_field", ARRIVES, options={"reward": own_reward}),
@@ -193,7 +201,7 @@ def play_turns(env, run, w, actions, start):
             env.step(None)
         else:
             run.mask[t, w, i] = True
-            env.step(actions[t, i] if t < len(actions) else np.zeros(2))
+            env.step(actions[t, i] if t < len(actions) else np.zeros_like(actions[0, i]))
             rounds[agent] = t + 1
             if min(rounds[other] for other in env.agents) > len(actions):
                 return len(actions) + 1
@@ -235,7 +243,7 @@ def sb3(case):
     env.seed(SEED)
     run.observation[0] = env.reset().reshape(split)
     for t, action in enumerate(actions):
-        observation, reward, done, infos = env.step(action.reshape(-1, 2))
+        observation, reward, done, infos = env.step(action.reshape(-1, action.shape[-1]))
         run.over[t] = done.reshape(split[:2]).all(axis=1)
         run.observation[t + 1], run.reward[t] = observation.reshape(split), reward.reshape(split[:2])
         for row in range(env.num_envs):

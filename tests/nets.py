@@ -23,7 +23,7 @@ def tensors(card, scale=0.3, seed=0):
     rng = np.random.default_rng(seed)
     return {
         name: (scale * rng.standard_normal(shape)).astype(np.float32)
-        for name, shape in shapes(card.network, card.sizes).items()
+        for name, shape in shapes(card.network, card.sizes, 2 + card.message_entries).items()
     }
 
 

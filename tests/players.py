@@ -1,7 +1,7 @@
 """The same policy through every interface: each player gives the actions of two worlds, decision by decision.
 
 Episodes are ``CYCLES`` decisions long at most and follow each other; nobody resets the policy. An entry of a record is
-the actions of a world's vehicles, shape (vehicle, 2), zero for lost ones.
+the actions of a world's vehicles, shape (vehicle, entry), zero for lost ones.
 """
 
 import gymnasium
@@ -38,7 +38,7 @@ def reference(name, scenario, seed, decisions):
 
 def by_agent(env, actions):
     """A dictionary as a record's entry."""
-    whole = np.zeros((len(env.possible_agents), 2), np.float32)
+    whole = np.zeros((len(env.possible_agents), *env.action_space("uuv_0").shape), np.float32)
     for agent, action in actions.items():
         if agent in env.agents:
             whole[env.possible_agents.index(agent)] = action
@@ -140,7 +140,7 @@ def sb3(name, scenario, seed, decisions, rng):
     observations = env.reset()
     for _ in range(decisions):
         actions = policy(observations)
-        for record, own in zip(records, actions.reshape(WORLDS, -1, 2), strict=True):
+        for record, own in zip(records, actions.reshape(WORLDS, -1, actions.shape[-1]), strict=True):
             record.append(own)
         observations, *_ = env.step(actions)
     return records

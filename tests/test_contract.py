@@ -27,7 +27,7 @@ def test_the_cases_show_every_ending(case):
     if case.overrides is contract.ARRIVES:
         assert (run.terminated.sum(axis=2) >= 2).any(), "those who are left arrive together"
         assert not run.truncated.any()
-    if case.scenario == "lossy" or case.name == "sea-loses":
+    if case.scenario == "lossy" or case.name in ("sea-loses", "talk-loses"):
         assert (run.terminated.any(axis=2) & ~run.terminated.all(axis=2)).any(), "a vehicle is lost alone"
     if case.name == "sinks":
         assert (run.over & run.terminated.any(axis=2) & ~run.truncated.any(axis=2)).any(), "the last are lost"
@@ -40,7 +40,7 @@ def test_every_api_gives_the_same_run(case, api):
 
 @pytest.mark.needs("stable_baselines3")
 def test_sb3_gives_the_same_run_or_refuses_losses(case):
-    if case.scenario == "lossy" or case.name in ("sinks", "sea-loses"):
+    if case.scenario == "lossy" or case.name in ("sinks", "sea-loses", "talk-loses"):
         with pytest.raises(ValueError, match="SwarmVecEnv can't represent the loss of a vehicle"):
             contract.sb3(case)
     else:

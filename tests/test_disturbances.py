@@ -50,14 +50,16 @@ def swim(overrides, decisions=40, worlds=1, seed=3, scenario=STARTER, **change):
     """A swarm after decisions that don't depend on its disturbances."""
     swarm, rng = started(scenario, overrides, worlds, seed, **change), np.random.default_rng(7)
     for _ in range(decisions):
-        swarm.step(rng.uniform(-1.0, 1.0, (worlds, swarm.num_vehicles, 2)))
+        action = rng.uniform(-1.0, 1.0, (worlds, swarm.num_vehicles, 2))
+        swarm.step(np.pad(action, ((0, 0), (0, 0), (0, swarm.scenario.modem.message_entries))))
     return swarm
 
 
 @pytest.mark.parametrize("channel", DISTURBANCE_CHANNELS)
 def test_the_code_of_disturbances_with_all_of_them_off_changes_no_bit(channel):
+    heard = {"modem.message_entries": 3} if channel == "messages" else {}
     for worlds in (1, 3):
-        calm, still = (swim({"sonar.channels": channels}, worlds=worlds) for channels in ([], [channel]))
+        calm, still = (swim(own, worlds=worlds) for own in ({}, {"sonar.channels": [channel], **heard}))
         theirs = still.snapshot()
         theirs["percept"] = theirs["percept"][..., : calm.layout.size]
         for name, array in calm.snapshot().items():

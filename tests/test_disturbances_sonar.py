@@ -455,3 +455,16 @@ def test_observations_stay_within_their_space(more, harsh):
         assert env.observation_space.contains(observations)
         observations, rewards, *_ = env.step(env.action_space.sample())
         assert np.isfinite(rewards).all()
+
+
+def test_odometry_is_the_motion_since_the_start_with_drift_in_the_frame_of_the_compass():
+    overrides = {"sonar.channels": ["odometry", "compass"], "obstacles": []}
+    for errors in ({}, DRIFT | COMPASS):
+        swarm = started("starter", overrides | errors, 2, 3)
+        start, rng = swarm.state.eta[:, :, :2].copy(), np.random.default_rng(0)
+        for _ in range(60):
+            swarm.step(rng.uniform(-1.0, 1.0, (2, swarm.num_vehicles, 2)))
+        moved = swarm.state.eta[:, :, :2] + swarm._disturbances.navigation_errors.position_error - start
+        told = swarm.percept["odometry"].astype(float) @ [1, 1j] * (swarm.percept["compass"].astype(float) @ [1, 1j])
+        np.testing.assert_allclose(told, moved @ [1, 1j], atol=1e-4)
+        assert np.abs(moved).max() > 1.0

@@ -17,13 +17,18 @@ BOW = {"name": "bow", "kind": "active", "mounting_deg": 0.0, "aperture_deg": 90.
 RING = {
     "name": "ring", "kind": "passive", "mounting_deg": 180.0, "aperture_deg": 270.0, "range_m": 300.0, "sub_sectors": 9,
 }  # fmt: skip
+TALK = {"modem.message_entries": 3, "sonar.channels": ["messages"]}
 
 
 @pytest.mark.parametrize("memory", [False, True], ids=["mlp", "gru"])
 @pytest.mark.parametrize("kind", ["mlp", "sectors", "moments"])
-@pytest.mark.parametrize("arrays", [None, [BOW, RING], [RING]], ids=["suite", "two", "passive"])
-def test_an_exported_network_acts_as_the_policy_does(arrays, kind, memory, tmp_path):
-    scenario = load_scenario("starter", overrides={"sonar.arrays": arrays} if arrays else {})
+@pytest.mark.parametrize(
+    "overrides",
+    [{}, {"sonar.arrays": [BOW, RING]}, {"sonar.arrays": [RING]}, TALK],
+    ids=["suite", "two", "passive", "talk"],
+)
+def test_an_exported_network_acts_as_the_policy_does(overrides, kind, memory, tmp_path):
+    scenario = load_scenario("starter", overrides=overrides)
     best = saved(tmp_path, scenario, kind=kind, memory=memory)
     scenario = with_policy_requirements(best, scenario)
     write_onnx(best, scenario, tmp_path / "policy.onnx")
@@ -39,7 +44,8 @@ def test_an_exported_network_acts_as_the_policy_does(arrays, kind, memory, tmp_p
         assert action.dtype == np.float32
         np.testing.assert_allclose(action, policy.act(env.swarm.percept)[0], rtol=0, atol=1e-5)
         observations, *_ = env.step(dict(zip(env.agents, action, strict=True)))
-    assert np.hypot(*action.T).max() <= 1.0 + 1e-6
+    assert np.hypot(*action[:, :2].T).max() <= 1.0 + 1e-6
+    assert np.abs(action).max() <= 1.0 + 1e-6
 
 
 @pytest.mark.parametrize("policy", ["bio_inspired", "scout", "mappo,safety_filter=true"])

@@ -21,7 +21,7 @@ NO_NUMBERS = ("version", "title", "source", "name")
 FAULTS = [{"kind": "array", "share": 0.1, "array": "bow"}, {"kind": "yaw", "share": 0.2, "onset_s": 3.0}]
 SEA = {"current.speed_mps": 0.5, "current.direction_deg": 30.0, "modem.period_s": 9.0, "faults": FAULTS}
 SOURCES = (
-    r"section|Table|Eq\.|assumed|none in the paper|as in the paper|MBARI|Nanomodem|"
+    r"section|Table|Eq\.|assumed|none in the paper|as in the paper|MBARI|Nanomodem|ahoi|"
     r"Repoulias|da Silva|Havenstrøm|lauv_gazebo|Prestero|Fossen|Allen|Sgarioto|von Benzon|Wu"
 )
 

@@ -134,6 +134,25 @@ def updated(change, memory, minibatches=10):
     return learner.arrays()
 
 
+@pytest.mark.parametrize("memory", [False, True])
+def test_a_message_that_is_not_sent_changes_no_update(memory):
+    """Neither do the entries that the policy drew outside the own slot; those that were sent do."""
+    arrays = []
+    for spoilt in (2.0, 0.0, 1.0):
+        problem = Toy(lambda x, a: x[:, 0] * a[:, 1], 4)
+        problem.sends = np.arange(64) % 3 == 0
+        made, by = Architecture(hidden=(32,), memory=memory), Ppo(horizon=8)
+        learner = Learner(
+            made, [("seen", problem.features)], problem.size, problem.part, by, np.random.default_rng(0), 5
+        )
+        batch, _ = learner.sample(problem, 0.4)
+        action = torch.where(batch.used == spoilt, torch.full_like(batch.action, 0.7), batch.action)
+        learner.update(batch._replace(action=action), 0.4, 1e-3)
+        arrays.append(learner.arrays())
+    assert all(np.array_equal(arrays[0][name], array) for name, array in arrays[1].items())
+    assert any(not np.array_equal(arrays[0][name], array) for name, array in arrays[2].items())
+
+
 @pytest.mark.parametrize(("memory", "since", "minibatches"), [(False, 3, 10), (True, 3, 10), (True, 0, 64)])
 def test_rows_of_lost_vehicles_change_nothing(memory, since, minibatches):
     """What lost vehicles do and receive has no effect on an update, even where a minibatch has no others."""

@@ -12,7 +12,7 @@ from research.tasks.studies import set_name
 from uuv_marl import load_scenario, scenario_names, uuv_swarm_v2
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.envs.state import state_table
-from uuv_marl.percept import CHANNELS, PerceptField, PerceptLayout
+from uuv_marl.percept import CHANNELS, EPISODE, PerceptField, PerceptLayout, percept_table
 from uuv_marl.scenario.task import task_class
 from uuv_marl.sim.observation import closeness_table
 from uuv_marl.tasks import TASKS, Follow
@@ -100,9 +100,10 @@ def tasks() -> list[tuple[str, ...]]:
 
 def channels() -> str:
     """The fields that all channels append to the observation."""
-    plain = PerceptLayout.of(load_scenario("single_obstacle"))
-    full = PerceptLayout.of(load_scenario("single_obstacle", overrides={"sonar.channels": list(CHANNELS)}))
-    return fields(full.table[len(plain.table) :], plain.size)
+    scenario = load_scenario("single_obstacle")
+    sonar, plain = scenario.sonar, PerceptLayout.of(scenario)
+    full = (*percept_table(sonar.num_sectors, sonar.num_active_sectors, CHANNELS, message_entries=2), *EPISODE)
+    return fields(full[len(plain.table) :], plain.size)
 
 
 def filled() -> dict[str, str]:

@@ -18,6 +18,8 @@ from uuv_marl.types import Bool, Float32, Float64, UInt64
 MAX_SPEED = 64.0
 """Velocities in a percept saturate here [m/s, rad/s], so that observation bounds are finite."""
 _MAX_VEHICLES = 16384.0
+NUM_RECENT = 4
+"""Number of the latest messages in a percept."""
 
 
 class Quantity(NamedTuple):
@@ -74,6 +76,9 @@ class DisturbanceFields(NamedTuple):
 
     ground_velocity: Annotated[Float32, "2", SPEED, "own surge and sway velocity over ground", "current"]
     water_velocity: Annotated[Float32, "2", SPEED, "own surge and sway velocity through the water", "current"]
+    odometry: Annotated[
+        Float32, "2", POSITION, "vector from the own position at the start to the present one, by its navigation",
+        "odometry"]
     age: Annotated[Float32, "sector", AGE, "per sub-sector: time since the reception of its reading", "age"]
     ranged: Annotated[Float32, "sector", FLAG, "per sub-sector: 1 if the array measures ranges, else 0", "ranged"]
     modem_identity: Annotated[
@@ -82,11 +87,29 @@ class DisturbanceFields(NamedTuple):
     modem_velocity: Annotated[
         Float32, "sector 2", SPEED, "per sub-sector: velocity over ground of that vehicle when it sent", "modem"]
     modem_age: Annotated[Float32, "sector", AGE, "per sub-sector: time since that message was sent", "modem"]
+    neighbour_message_valid: Annotated[
+        Float32, "sector", FLAG, "per sub-sector: 1 once a message of the vehicle detected has arrived, else 0",
+        "messages"]
+    neighbour_message: Annotated[
+        Float32, "sector entry", DIRECTION, "per sub-sector: entries of its latest message that has arrived, else 0",
+        "messages"]
+    neighbour_message_age: Annotated[
+        Float32, "sector", DURATION, "per sub-sector: time since that message was sent", "messages"]
+    message_valid: Annotated[
+        Float32, "recent", FLAG, "1 for each of the four latest messages, the latest first, else 0", "messages"]
+    message: Annotated[Float32, "recent entry", DIRECTION, "their entries, whoever sent them, else 0", "messages"]
+    message_age: Annotated[Float32, "recent", DURATION, "time since each was sent, else 0", "messages"]
+    time_to_slot: Annotated[
+        Float32, "1", DURATION, "time until the own next slot, in which the action then in force is sent", "messages"]
 # fmt: on
 
 
 class FieldSpec(NamedTuple):
-    """Declaration of a field: its axes ("sector" and "active" count sub-sectors) and its channel, "" for none."""
+    """Declaration of a field.
+
+    Axes "sector" and "active" count sub-sectors, "entry" numbers in a message and "recent" ``NUM_RECENT`` messages; the
+    channel is "" for none.
+    """
 
     axes: str
     quantity: Quantity
@@ -130,9 +153,13 @@ EPISODE: FieldTable = (
 
 
 @functools.cache
-def percept_table(num_sectors: int, num_active: int, channels: tuple[str, ...] = CHANNELS) -> FieldTable:
+def percept_table(
+    num_sectors: int, num_active: int, channels: tuple[str, ...] = CHANNELS, message_entries: int = 0
+) -> FieldTable:
     """Fields of a percept in order. Everything is relative to the vehicle: x forward, y starboard."""
-    sizes = {"1": 1, "2": 2, "sector": num_sectors, "active": num_active}
+    sizes = {
+        "1": 1, "2": 2, "sector": num_sectors, "active": num_active, "recent": NUM_RECENT, "entry": message_entries,
+    }  # fmt: skip
     return tuple(
         PerceptField(name, tuple(sizes[axis] for axis in spec.axes.split()), spec.quantity, spec.meaning)
         for name, spec in FIELDS.items()
@@ -156,8 +183,8 @@ class PerceptLayout:
     @staticmethod
     def of(scenario: Scenario) -> "PerceptLayout":
         """The layout that a scenario's sonar suite, channels and task result in."""
-        sonar = scenario.sonar
-        own = percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels)
+        sonar, entries = scenario.sonar, scenario.modem.message_entries
+        own = percept_table(sonar.num_sectors, sonar.num_active_sectors, sonar.channels, entries)
         return PerceptLayout(own + task_fields(scenario))
 
     @functools.cached_property

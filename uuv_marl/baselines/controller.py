@@ -39,8 +39,8 @@ class Controller(Policy):
         return tuned(self.tuned_as, tuned_for) if self.tuned_as or tuned_for else {}
 
     def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        action: Float32 = np.zeros((*percept.flat.shape[:2], 2), np.float32)
+        """Actions of shape (world, vehicle, 2), and the messages of a policy that sends some."""
+        action: Float32 = np.zeros((*percept.flat.shape[:2], 2 + self.requirements.message_entries), np.float32)
         self._write(percept, action)
         return action
 

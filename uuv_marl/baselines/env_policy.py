@@ -87,7 +87,7 @@ class EnvPolicy:
                 "observations must have the shape that the environment gives them, for instance "
                 f"{(worlds, vehicles, *entry)} (world, vehicle, entry), got {shape}"
             )
-        return self._act(np.arange(rows), observations.reshape(rows, -1)).reshape(*shape[:-1], 2)
+        return self._act(np.arange(rows), observations.reshape(rows, -1)).reshape(*shape[:-1], -1)
 
     def _act(self, index: Int64, observations: NDArray[Any]) -> Float32:
         """Actions of these rows, ``world * vehicles + i``, shape (row, 2), from their observations (row, entry)."""
@@ -108,7 +108,8 @@ class EnvPolicy:
         self._flat[index] = rows
         if renewed or self._before is None:
             flat = self._flat.reshape(percept.flat.shape)
-            self._actions = self.policy.act(Percept(flat, layout, clock, percept.alive)).reshape(-1, 2).copy()
+            action = self.policy.act(Percept(flat, layout, clock, percept.alive))
+            self._actions = action.reshape(-1, action.shape[2]).copy()
         return self._actions[index]
 
 

@@ -27,7 +27,7 @@ def policy_requirements(name: str) -> PolicyRequirements:
 
 
 def with_policy_requirements(name: str, scenario: Scenario) -> Scenario:
-    """The scenario with exactly the channels, the yaw damping and the decision period that a policy requires.
+    """The scenario with exactly the channels, messages, yaw damping and decision period that a policy requires.
 
     With ``timing.fixed``, the scenario's damping and period stay, unless the name has ``own_clock=true``. If the
     scenario has ``modem``, it replaces the channel ``link``, except for policies that require both and for trained
@@ -40,7 +40,9 @@ def with_requirements(name: str, required: PolicyRequirements, scenario: Scenari
     """``with_policy_requirements`` for a policy with known requirements."""
     timing, channels = scenario.timing, required.channels
     changes: dict[str, object] = {
-        "sonar.channels": list(channels) if is_trained(name) else resolved_channels(scenario, channels)
+        "sonar.channels": list(channels) if is_trained(name) else resolved_channels(scenario, channels),
+        "modem.message_entries": required.message_entries,
+        "modem.message_vectors": required.message_vectors,
     }
     if parse_name(name).own_clock or not timing.fixed:
         usual = timing.control_step_s if timing.fixed else timing.decision_period_s

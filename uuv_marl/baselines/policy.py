@@ -139,7 +139,8 @@ class Policy:
             percept: percepts of shape (world, vehicle, ...).
 
         Returns:
-            Actions of shape (world, vehicle, 2), float32, within the unit disc, or with a rudder within the square.
+            Actions of shape (world, vehicle, ``scenario.action_size``), float32: forces within the unit disc, or with a
+            rudder within the square, and messages, zeros from a policy that sends none.
 
         Raises:
             PolicyError: the percept is of another swarm; or the policy has a memory and a decision was skipped.
@@ -158,21 +159,25 @@ class Policy:
         """Hook: update ``memory`` from the percepts of these worlds, a mask of shape (world,)."""
 
     def decide(self, percept: Percept) -> Float32:
-        """Actions, or desired forces as shares of full thrust and torque (``outputs_force``), (world, vehicle, 2)."""
+        """Actions, or desired forces as shares of full thrust and torque (``outputs_force``), (world, vehicle, 2).
+
+        The entries of its messages may follow, shape (world, vehicle, ``scenario.action_size``).
+        """
         raise NotImplementedError
 
     @final
     def drive(self, percept: Percept, output: Float32) -> Float32:
-        """Actions for the output of ``decide``, shape (world, vehicle, 2), which may be overwritten."""
+        """Actions for the output of ``decide``, which may be overwritten."""
         if self.rudder is not None:
             steer_by_rudder(self.flat(percept), self.layout.offsets, self.rudder, output)
         self.record_action(output)
-        return output
+        silent = self.scenario.action_size - output.shape[2]
+        return np.pad(output, ((0, 0), (0, 0), (0, silent))) if silent else output
 
     def record_action(self, action: Float32) -> None:
         """Store the actions taken, if ``Memory`` has an array for them; for actions that replace those of ``act``."""
         if "action" in getattr(self.Memory, "_fields", ()):
-            self.memory.action[self.active] = action[self.active]
+            self.memory.action[self.active] = action[self.active, :, :2]
         for part in self.parts.values():
             part.record_action(action)
 

@@ -16,14 +16,14 @@ from uuv_marl.types import Bool, Float32
 
 
 class RandomMemory(NamedTuple):
-    """The latest random forces."""
+    """The latest random actions."""
 
-    force: Annotated[Float32, "world vehicle 2", "Shares of full force [1]."]
+    drawn: Annotated[Float32, "world vehicle entry", "Shares of full force, and a message [1]."]
     started: Annotated[Bool, "world", "Whether the world's random stream has started in this episode."]
 
 
 class Random(Policy):
-    """A new force, uniform on the unit disc, for every vehicle at every decision.
+    """A new force, uniform on the unit disc, and a random message for every vehicle at every decision.
 
     An episode's random stream starts from its seed, or from that of an earlier ``reset(seed)``; it differs from the
     stream of the world itself.
@@ -32,6 +32,7 @@ class Random(Policy):
     Memory: ClassVar[type[Any] | None] = RandomMemory
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1) -> None:
+        self.axes = {"entry": scenario.action_size}
         super().__init__(scenario, num_worlds)
         self._rngs: list[np.random.Generator | None] = [None] * num_worlds
 
@@ -50,18 +51,19 @@ class Random(Policy):
         super()._forget(worlds)
 
     def remember(self, percept: Percept, worlds: Bool) -> None:
-        """Draw the forces of these worlds."""
-        force, clock = self.memory.force, percept.clock
+        """Draw the actions of these worlds."""
+        action, clock = self.memory.drawn, percept.clock
         for w in np.flatnonzero(worlds).tolist():
             rng = self._rngs[w] = self._rngs[w] or _stream(0 if clock is None else int(clock.seed[w]))
-            drawn = rng.random((force.shape[1], 2))
+            drawn = rng.random((action.shape[1], 2))
             radius, angle = np.sqrt(drawn[:, 0]), 2.0 * math.pi * drawn[:, 1]
-            force[w] = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+            action[w, :, :2] = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+            action[w, :, 2:] = rng.uniform(-1.0, 1.0, action[w, :, 2:].shape)
         self.memory.started[worlds] = True
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002 - random actions see nothing
-        """Actions of shape (world, vehicle, 2)."""
-        return self.memory.force.copy()
+        """Actions of shape (world, vehicle, ``scenario.action_size``)."""
+        return self.memory.drawn.copy()
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """A copy of all state that later decisions depend on, random streams included."""

@@ -25,6 +25,10 @@ class PolicyRequirements(NamedTuple):
     """Decision period [s]; None if the policy works with any."""
     channels_if: Mapping[str, Sequence[str]] = {}
     """Further channels by the name of a parameter that requires them where it is true."""
+    message_entries: int = 0
+    """Numbers in a message that it sends (``modem.message_entries``); 0 if it sends none."""
+    message_vectors: int = 0
+    """Vectors among these (``modem.message_vectors``)."""
     outputs_force: bool = False
     """Whether ``decide`` returns desired forces. For a vehicle with a rudder they are then turned into thrust and
     rudder (``baselines.rudder``); for other vehicles they are actions already."""
@@ -69,6 +73,9 @@ def check_requirements(name: str, required: PolicyRequirements, scenario: Scenar
     late = period and not math.isclose(scenario.timing.decision_period_s, period, rel_tol=1e-9)
     if late:
         needs.append(f"a decision every {period:g} s (timing.decision_period_s)")
+    modem, wanted = scenario.modem, (required.message_entries, required.message_vectors)
+    if wanted[0] and wanted != (modem.message_entries, modem.message_vectors):
+        needs.append("messages with modem.message_entries = {} and modem.message_vectors = {}".format(*wanted))
     if needs:
         own = " (add own_clock=true to the policy's name)" if late and scenario.timing.fixed else ""
         raise PolicyError(

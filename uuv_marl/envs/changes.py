@@ -34,6 +34,7 @@ class EnvOptions(Changes, total=False):
 
 
 _CHANNELS, _YAW_DAMPING, _PERIOD = "sonar.channels", "actuators.yaw_damping_nms", "timing.decision_period_s"
+_ENTRIES, _VECTORS = "modem.message_entries", "modem.message_vectors"
 _FIELDS = {"num_vehicles": "swarm.num_vehicles", "decision_period": _PERIOD, "task": "task"}
 """Fields that arguments stand for."""
 
@@ -85,7 +86,7 @@ def _with_requirements(policy: str, base: Scenario, asked: Scenario, given: Mapp
             f"{_CHANNELS} can't hold {', '.join(sorted(dropped))}: policy {policy!r} requires "
             f"{', '.join(channels) or 'no channels'}; {remedy}"
         )
-    for name in (_YAW_DAMPING, _PERIOD):
+    for name in (_YAW_DAMPING, _PERIOD, _ENTRIES, _VECTORS):
         section, field = name.split(".")
         wanted, needed = (getattr(getattr(each, section), field) for each in (asked, required))
         if override_of(given, name) is not None and not math.isclose(wanted, needed, rel_tol=1e-9):

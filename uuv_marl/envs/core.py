@@ -115,7 +115,7 @@ class BatchedEnv:
             raise RuntimeError(f"{what} was called before reset; call reset() to start an episode")
 
     def step(self, action: ArrayLike) -> StepResult:
-        """One decision of every world; ``action`` has shape (world, vehicle, 2).
+        """One decision of every world; ``action`` has shape (world, vehicle, ``scenario.action_size``).
 
         A world whose episode is over keeps its state, ``world_terminated`` and ``world_truncated``, and its reward is
         0, until it is reset.

@@ -27,8 +27,9 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
     """A swarm of UUVs as PettingZoo agents; ``parallel_env`` makes one.
 
     Observation: the vehicle's percept, flattened and scaled by the table in ``uuv_marl.percept``. Action: surge force
-    and yaw torque as shares of full force, shape (2,), projected onto the unit disc. An agent's last info holds how its
-    episode ended (``uuv_marl.envs.ending.ending``). ``np_random`` is a generator for wrappers and users, seeded by
+    and yaw torque as shares of full force, projected onto the unit disc, and ``modem.message_entries`` numbers from -1
+    to 1, its message; shape (2 + entry,). An agent's last info holds how its episode ended
+    (``uuv_marl.envs.ending.ending``). ``np_random`` is a generator for wrappers and users, seeded by
     ``reset(seed=s)``; the environment itself never draws from it.
     """
 
@@ -52,9 +53,9 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         self._index = {agent: i for i, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
         self._rows: slice | Int64 = slice(None)
-        layout = batch.layout
+        layout, self._action_size = batch.layout, self.scenario.action_size
         self.observation_spaces = {agent: Box(layout.low, layout.high) for agent in self.possible_agents}
-        self.action_spaces = {agent: Box(-1.0, 1.0, (2,)) for agent in self.possible_agents}
+        self.action_spaces = {agent: Box(-1.0, 1.0, (self._action_size,)) for agent in self.possible_agents}
         self.state_space = Box(batch.state_layout.low, batch.state_layout.high)
 
     @property
@@ -131,7 +132,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         try:
             rows = [actions[agent] for agent in self.agents]
             masked = np.ma.MaskedArray in set(map(type, rows))  # an array of them would lose the masks
-            values = None if masked else action_array(np.array(rows), (len(rows), 2), "actions")
+            values = None if masked else action_array(np.array(rows), (len(rows), self._action_size), "actions")
         except (LookupError, TypeError, ValueError, RuntimeError, OverflowError):
             values = None
         if values is None or not math.isfinite(np.vdot(values, values)):  # quick; finite numbers may overflow in it
@@ -141,7 +142,7 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
             raise ValueError(f"agent {unknown!r} is unknown; agents are uuv_0 to {self.possible_agents[-1]}")
         if len(values) == len(self.possible_agents):
             return values[None]
-        array = np.zeros((1, len(self.possible_agents), 2), np.float32)
+        array = np.zeros((1, len(self.possible_agents), self._action_size), np.float32)
         array[0, self._rows] = values
         return array
 
@@ -153,7 +154,8 @@ class SwarmParallelEnv(RenderMixin, ParallelEnv[str, Float32, Float32 | None]):
         for agent in self.agents:
             if agent not in actions:
                 raise ValueError(f"the action of {agent} is missing; give one for each of env.agents")
-            rows.append(action_array(cast(ArrayLike, actions[agent]), (2,), f"the action of {agent}"))
+            own = cast(ArrayLike, actions[agent])
+            rows.append(action_array(own, (self._action_size,), f"the action of {agent}"))
             if not np.isfinite(rows[-1]).all():
                 raise ValueError(f"the action of {agent} must be finite, got {rows[-1].tolist()}")
         return np.array(rows)

@@ -58,10 +58,8 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         self._wrap(batch, render_mode, render_options)
         refuse_losses(self.scenario, "SwarmVecEnv")
         self._shape = (num_worlds, self.swarm.num_vehicles)
-        layout = batch.layout
-        super().__init__(
-            num_worlds * self.swarm.num_vehicles, Box(layout.low, layout.high), Box(-1.0, 1.0, (2,), np.float32)
-        )
+        layout, acts = batch.layout, Box(-1.0, 1.0, (self.scenario.action_size,), np.float32)
+        super().__init__(num_worlds * self.swarm.num_vehicles, Box(layout.low, layout.high), acts)
         self.metadata = {**self.metadata, "render_fps": self._renderer.fps}  # SB3 has just written its own
         self._seed: int | None = None
         self._actions: Float32 | None = None
@@ -85,9 +83,9 @@ class SwarmVecEnv(EnvMixin, VecEnv):
         return observation.reshape(self.num_envs, -1)
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep the actions, shape (row, 2), for ``step_wait``."""
-        rows = action_array(actions, (self.num_envs, 2), "actions, a row per vehicle,")
-        self._actions = rows.reshape(*self._shape, 2)
+        """Keep the actions, shape (row, entry), for ``step_wait``."""
+        rows = action_array(actions, (self.num_envs, self.scenario.action_size), "actions, a row per vehicle,")
+        self._actions = rows.reshape(*self._shape, -1)
 
     def step_wait(self) -> tuple[Float32, Float32, Bool, list[dict[str, Any]]]:
         """Observations, rewards, dones and infos of every row."""

@@ -62,7 +62,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         self._info_terms = info_terms
         layout = batch.layout
         self.observation_space = Box(layout.low, layout.high)
-        self.action_space = Box(-1.0, 1.0, (2,))
+        self.action_space = Box(-1.0, 1.0, (self.scenario.action_size,))
         self._running = False
 
     def reset(
@@ -80,7 +80,7 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
         """One decision of the learner and of all others. Raises RuntimeError before a reset and after the end."""
         if not self._running:
             raise RuntimeError("no episode is running; call reset() to start one")
-        own = action_array(action, (2,), "the action")
+        own = action_array(action, (self.scenario.action_size,), "the action")
         if not np.isfinite(own).all():
             raise ValueError(f"the action must be finite, got {own.tolist()}")
         with rounding():

@@ -26,7 +26,7 @@ GROUP = "uuv"
 class SwarmEnv(EnvMixin, EnvBase):
     """Worlds with batch size (num_worlds,), in float32 and bool, on the CPU by default.
 
-    Under ``uuv``: ``observation`` (vehicle, entry), ``mask`` (vehicle,), ``action`` (vehicle, 2), ``reward``
+    Under ``uuv``: ``observation`` (vehicle, entry), ``mask`` (vehicle,), ``action`` (vehicle, entry), ``reward``
     (vehicle, 1), and ``done``, ``terminated``, ``truncated`` (vehicle, 1). At the root: ``state`` (entry,) for
     centralised critics, and ``done``, ``terminated``, ``truncated`` (1,) of the world, by which collectors and
     ``rollout`` reset it. A lost vehicle stays ``terminated``, its ``mask`` False, its observation and reward 0, until
@@ -76,7 +76,8 @@ class SwarmEnv(EnvMixin, EnvBase):
 
         observation = {"observation": boxed(batch.layout, group), "mask": flags(*group)}
         self.observation_spec = nested(observation, {"state": boxed(self._batch.state_layout, worlds)})
-        self.action_spec = nested({"action": Bounded(-1.0, 1.0, torch.Size((*group, 2)), self.device, torch.float32)})
+        acts = torch.Size((*group, self.scenario.action_size))
+        self.action_spec = nested({"action": Bounded(-1.0, 1.0, acts, self.device, torch.float32)})
         self.reward_spec = nested({"reward": Unbounded(torch.Size((*group, 1)), self.device, torch.float32)})
         self.done_spec = nested(endings(*group), endings(*worlds))
 

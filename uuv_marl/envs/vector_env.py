@@ -25,7 +25,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
 ):
     """Worlds stepped together; ``vector_env`` makes them.
 
-    Observations have shape (num_envs, vehicle, entry), actions (num_envs, vehicle, 2). A reward is the mean over a
+    Observations have shape (num_envs, vehicle, entry), actions (num_envs, vehicle, entry). A reward is the mean over a
     world's vehicles. An episode terminates when the task is done or all vehicles are lost; the time limit truncates it.
     Gymnasium's ``autoreset_mode`` then resets the world:
 
@@ -62,7 +62,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         """Worlds that the next step resets."""
         n, layout = batch.swarm.num_vehicles, batch.layout
         self.single_observation_space = Box(np.tile(layout.low, (n, 1)), np.tile(layout.high, (n, 1)))
-        self.single_action_space = Box(-1.0, 1.0, (n, 2))
+        self.single_action_space = Box(-1.0, 1.0, (n, self.scenario.action_size))
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.state_space = Box(batch.state_layout.low, batch.state_layout.high)
@@ -87,7 +87,7 @@ class SwarmVectorEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - s
         return observation, _masked({"agent_mask": self.swarm.state.alive & ~self._batch.over[:, None]}, mask)
 
     def step(self, actions: ArrayLike) -> tuple[Float32, Float64, Bool, Bool, Infos]:
-        """One decision of every vehicle of every world, shape (num_envs, vehicle, 2), and resets."""
+        """One decision of every vehicle of every world, shape (num_envs, vehicle, entry), and resets."""
         result, due = self._batch.step(actions), self._due
         if due.any():
             result = result._replace(

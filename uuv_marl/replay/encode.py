@@ -29,6 +29,7 @@ UNITS = {
     "speed": 0.2,
     "force": 0.2,
     "spacing": 0.5,
+    "sending": 1.0,
     "inspected_heading": _TURN / 1024,
     "neighbour": 0.25,
     "echo_range": 0.25,
@@ -100,6 +101,8 @@ def _arrays(recording: Recording) -> dict[str, Any]:
         "force": recording.force,
         "spacing": recording.spacing,
     }
+    if recording.scenario.modem.message_entries:
+        rounded["sending"] = np.array([scene.sending for scene in scenes], np.float32)
     exact = {**recording.series, "obstacles": discs[-1], "marks": np.array(marks, np.float32)}
     if np.ptp(discs, axis=0).any():
         rounded["traffic"] = discs[:, :, :2]

@@ -85,7 +85,7 @@ class _Tape:
             "clearance": facts.clearance[0],
             "collisions": facts.vehicle_collisions[0],
             "detected_index": swarm.detected_index[0, seen],
-            "action": np.full((len(seen), 2), np.nan) if action is None else action[0, seen],
+            "action": np.full((len(seen), 2), np.nan) if action is None else action[0, seen, :2],
             **{name: swarm.percept[name][0, seen] for name in ("neighbour", "echo", "echo_range", "echo_position")},
         }
         for name, values in now.items():

@@ -23,14 +23,16 @@ def vehicle_disturbances(scenario: Scenario) -> list[str]:
     current, navigation, actuators = scenario.current, scenario.navigation, scenario.actuators
     mismatch, sound_mps = scenario.mismatch, scenario.latency.sound_speed_mps
     differ = max(mismatch.mass, mismatch.added_mass, mismatch.drag, mismatch.thrust)
-    every_s, lost = scenario.modem.round_s(scenario.swarm.num_vehicles, sound_mps), scenario.modem.loss_probability
+    modem, every_s = scenario.modem, scenario.modem.round_s(scenario.swarm.num_vehicles, sound_mps)
+    chosen = f" of {modem.message_entries} x {modem.bits_per_entry} bits" if modem.message_entries else ""
     phrases = {
         f"current {current.speed_mps:g} m/s": current.speed_mps > 0.0,
         f"current varies by {current.variation_mps:g} m/s": current.variation_mps > 0.0,
         f"eddies of {current.eddy_speed_mps:g} m/s": current.eddies > 0 and current.eddy_speed_mps > 0.0,
         "own velocity known through the water": current.velocity == "water",
         **_of_sonar(scenario),
-        f"messages every {every_s:.3g} s, {lost:.3g} of them lost": "modem" in scenario.sonar.channels,
+        f"messages{chosen} every {every_s:.3g} s, {modem.loss_probability:.3g} of them lost": modem.message_entries > 0
+        or "modem" in scenario.sonar.channels,
         f"position drifts by {navigation.drift_share:.3g} of the distance": navigation.drift_share > 0.0,
         f"compass bias {navigation.compass_bias_deg:g} deg": navigation.compass_bias_deg > 0.0,
         f"thrust lags {actuators.thrust_lag_s:g} s": actuators.thrust_lag_s > 0.0,

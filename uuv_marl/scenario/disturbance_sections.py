@@ -118,23 +118,45 @@ class Navigation(Section):
 
 
 class Modem(Section):
-    """Acoustic messages: in a round each vehicle sends one, in turn. The channel ``modem`` holds those received."""
+    """Acoustic messages: in a round each vehicle sends one. Without ``message_entries`` it is its velocity."""
 
     period_s: Annotated[float, within(0.001, 36_000)] | None = None
-    """Period of a round; absent: a slot for each vehicle, in which it sends and sound travels ``guard_m``."""
+    """Mean time between two messages of a vehicle; absent: a slot for each vehicle."""
     payload_bytes: Annotated[int, within(1, 4_096)]
-    """Length of a message."""
+    """Length of a message with a velocity."""
+    message_entries: Annotated[int, within(0, 64)]
+    """Numbers in a message, which the vehicle's action holds beside the forces; 0: messages hold its velocity."""
+    message_vectors: Annotated[int, within(0, 32)]
+    """Vectors with which these numbers begin, two each. A sender gives them in its body frame, within the unit disc;
+    they are sent north and east by its compass, and read by the receiver's in its own frame."""
+    bits_per_entry: Annotated[int, within(1, 32)]
+    """Bits of such a number: it is rounded to the nearest of 2^bits values, evenly from -1 to 1."""
+    header_bytes: Annotated[int, within(0, 4_096)]
+    """Length of the header of a message with numbers."""
+    access: Literal["tdma", "aloha"]
+    """Who sends such messages: each vehicle in its own slot of a round, or in random slots, where messages collide."""
     bit_rate_bps: Annotated[float, within(1, 1_000_000)]
     """Net bit rate."""
     guard_m: NonNegative
     """Distance that a message travels before the next is sent."""
+    range_m: Radius
+    """Largest distance at which a message with numbers is received, and interferes with another."""
     loss_probability: Probability
     """Probability, for each listener, that a message is lost."""
 
+    @property
+    def airtime_s(self) -> float:
+        """Time in which a message is sent [s]."""
+        own = self.header_bytes * 8 + self.message_entries * self.bits_per_entry
+        return (own if self.message_entries else 8.0 * self.payload_bytes) / self.bit_rate_bps
+
+    def slot_s(self, sound_speed_mps: float) -> float:
+        """Shortest time between two messages: one is sent, and sound travels ``guard_m`` [s]."""
+        return self.airtime_s + self.guard_m / sound_speed_mps
+
     def round_s(self, num_vehicles: int, sound_speed_mps: float) -> float:
-        """Time between two messages of a vehicle in a swarm of this size [s]."""
-        slot = 8.0 * self.payload_bytes / self.bit_rate_bps + self.guard_m / sound_speed_mps
-        return self.period_s if self.period_s is not None else num_vehicles * slot
+        """Mean time between two messages of a vehicle in a swarm of this size [s]."""
+        return self.period_s if self.period_s is not None else num_vehicles * self.slot_s(sound_speed_mps)
 
 
 class Mismatch(Section):

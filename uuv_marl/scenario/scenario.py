@@ -68,6 +68,11 @@ class Scenario(fields.Section):
         return task_numbers(self.task)
 
     @property
+    def action_size(self) -> int:
+        """Entries of a vehicle's action: two forces, and those of its next message."""
+        return 2 + self.modem.message_entries
+
+    @property
     def max_obstacles(self) -> int:
         """Largest number of obstacles in a world of this scenario."""
         drawn = self.task_class.sizes(self).get("obstacle")
@@ -99,6 +104,7 @@ class Scenario(fields.Section):
         _check_times(self)
         _check_sonar(self)
         _check_faults(self)
+        _check_messages(self)
         if self.max_eddies > MAX_EDDIES:
             raise ValueError(
                 f"current.eddies = {self.current.eddies} makes {self.max_eddies:,} eddies around this map; at most "
@@ -243,6 +249,41 @@ def _check_faults(scenario: Scenario) -> None:
     for k, fault in enumerate(scenario.faults):
         if fault.array is not None and fault.array not in names:
             raise ValueError(f"faults.{k}.array must be one of {', '.join(names)}, got {fault.array!r}")
+
+
+def _check_messages(scenario: Scenario) -> None:
+    """Slots hold whole messages, which end before the next ones begin; only entries that are sent are observed."""
+    modem, sound, channels = scenario.modem, scenario.latency.sound_speed_mps, scenario.sonar.channels
+    if modem.message_entries == 0:
+        if "messages" in channels:
+            raise ValueError("modem.message_entries must be at least 1 with the channel messages, got 0; raise it")
+        return
+    if "modem" in channels:
+        raise ValueError(
+            f"sonar.channels can't hold modem where modem.message_entries = {modem.message_entries} replaces the "
+            "velocity in messages; use the channel messages"
+        )
+    if 2 * modem.message_vectors > modem.message_entries:
+        raise ValueError(
+            f"modem.message_vectors must be at most half of modem.message_entries = {modem.message_entries}, got "
+            f"{modem.message_vectors}; lower it"
+        )
+    if modem.guard_m < modem.range_m:
+        raise ValueError(
+            f"modem.guard_m must be at least modem.range_m = {modem.range_m:g}, so that a message has arrived when the "
+            f"next is sent, got {modem.guard_m:g}; raise it, or lower the range"
+        )
+    slot, slots = modem.slot_s(sound), scenario.swarm.num_vehicles if modem.access == "tdma" else 1
+    if modem.period_s is not None and modem.period_s < slots * slot:
+        raise ValueError(
+            f"modem.period_s must be at least {slots * slot:.4g}, {slots} slots of {slot:.4g} s each, got "
+            f"{modem.period_s:g}; raise it, or shorten messages or modem.guard_m"
+        )
+    if slot < scenario.timing.control_step_s:
+        raise ValueError(
+            f"modem.guard_m = {modem.guard_m:g} and modem.bit_rate_bps = {modem.bit_rate_bps:g} make slots of "
+            f"{slot:.4g} s, shorter than timing.control_step_s = {scenario.timing.control_step_s:g}; raise the guard"
+        )
 
 
 def _check_speed(scenario: Scenario) -> None:

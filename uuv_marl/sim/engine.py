@@ -58,8 +58,8 @@ class Engine:
     def step(self, action: Float32, active: Bool | None, on_stepped: Callable[[int, int], None] | None = None) -> bool:
         """Advance the ``active`` worlds, shape (world,), default all, by one decision; return whether any has diverged.
 
-        ``action``, shape (world, vehicle, 2), is finite except for lost vehicles. ``on_stepped`` is called with start
-        and end of each range of worlds that was stepped. A world that has diverged stays unchanged.
+        ``action``, shape (world, vehicle, entry), is finite except for lost vehicles. ``on_stepped`` is called with
+        start and end of each range of worlds that was stepped. A world that has diverged stays unchanged.
         """
         running = self._every if active is None else np.ascontiguousarray(active)
 

@@ -29,7 +29,7 @@ def load_one(w: int, i: int, state: State, now: Columns) -> None:
 
 @compiled
 def load_action(w: int, action: Float32, now: Columns, plant: Plant) -> None:
-    """Load the actions of world w, shape (world, vehicle, 2), projected onto the actuators' range."""
+    """Load the forces of the actions of world w, shape (world, vehicle, entry), projected onto the actuators' range."""
     for i in range(action.shape[1]):
         now.a_x[i], now.a_y[i] = limited(np.float64(action[w, i, 0]), np.float64(action[w, i, 1]), plant)
 

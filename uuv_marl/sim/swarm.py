@@ -121,6 +121,27 @@ class Swarm:
         return np.stack([c * x - s * y, c * y + s * x], axis=-1)
 
     @property
+    def sends(self) -> Bool:
+        """Vehicles whose next slot begins during the next decision, which sends its message, shape (world, vehicle)."""
+        if self.scenario.modem.message_entries == 0:
+            return np.zeros_like(self.state.alive)
+        disturbances, end_s = cast(Any, self._disturbances), self.facts.time_s + self.scenario.timing.decision_period_s
+        start_s = disturbances.packets.next_slot * disturbances.packet_model.slot_s
+        return self.state.alive & (start_s < end_s[:, None] - 1e-9)
+
+    @property
+    def sent(self) -> Bool:
+        """Vehicles that began to send a message during the latest decision, shape (world, vehicle)."""
+        if self.scenario.modem.message_entries == 0:
+            return np.zeros_like(self.state.alive)
+        disturbances, begin_s = (
+            cast(Any, self._disturbances),
+            self.facts.time_s - self.scenario.timing.decision_period_s,
+        )
+        slot = disturbances.packets.packet_slot
+        return (slot >= 0) & (slot * disturbances.packet_model.slot_s > begin_s[:, None] - 1e-9)
+
+    @property
     def time_limit_s(self) -> Float64:
         """Time at which an episode is truncated [s], shape (world,)."""
         return self.scenario.time_limit.of(self.duration_s)
@@ -269,12 +290,12 @@ class Swarm:
         """Advance by one decision period.
 
         Args:
-            action: shares of full surge force and yaw torque, shape (world, vehicle, 2), rounded to float32 and
-                projected onto the unit disc. Entries of lost vehicles are ignored.
+            action: shape (world, vehicle, 2 + ``modem.message_entries``), rounded to float32: shares of full surge
+                force and yaw torque, projected onto the unit disc, and the message. Those of lost vehicles are ignored.
             active: worlds to step, shape (world,); the others stay unchanged. Default all.
             on_stepped: called with start and end of each range of worlds that was stepped, by its thread.
         """
-        action = action_array(action, (self.num_worlds, self.num_vehicles, 2), "action")
+        action = action_array(action, (self.num_worlds, self.num_vehicles, self.scenario.action_size), "action")
         if not np.isfinite(action).all() and not np.isfinite(action[self.state.alive]).all():
             w, i, k = (int(index) for index in np.argwhere(~np.isfinite(action) & self.state.alive[:, :, None])[0])
             raise ValueError(f"action must be finite, got {action[w, i, k]} for vehicle {i} of world {w}")

@@ -286,6 +286,8 @@ def step_world(
         num_alive += int(world.state.alive[w, i])
     load_state(w, world.state, workspace.now)
     load_action(w, action, workspace.now, model.plant)
+    if disturbances is not None:
+        disturbing.load_messages(w, action, world, disturbances)
     for control_step_index in range(control_steps):
         grid = control_step(w, control_step_index == 0, world, model, workspace, disturbances)
         if disturbances is not None:
@@ -309,7 +311,7 @@ def step_worlds(
 ) -> bool:  # fmt: skip
     """Advance the active worlds from ``begin`` to ``end`` by one decision period; return whether any has diverged.
 
-    ``active`` has shape (world,), ``action`` (world, vehicle, 2); ``thread`` is the index of the workspace.
+    ``active`` has shape (world,), ``action`` (world, vehicle, entry); ``thread`` is the index of the workspace.
     """
     own, diverged = workspace(buffers, thread), False
     for w in range(begin, end):

@@ -47,6 +47,8 @@ class Rollout(NamedTuple):
     """0 where an episode begins, else 1."""
     acted: Tensor
     """1 for vehicles that acted, 0 for those that were lost before."""
+    used: Tensor
+    """1 for entries of the action that have an effect: forces, and messages in the vehicle's own slot; else 0."""
     part: Tensor
     """Index of the row's part of the training."""
     state: Tensor
@@ -64,14 +66,15 @@ class Learner:
             part, and the critic has an output for each.
         config: hyperparameters.
         rng: for initial weights, noise, and the order of samples.
+        outputs: entries of an action.
     """
 
     def __init__(
         self, architecture: Architecture, sizes: Sizes, size: int, part: NDArray[np.int64], config: Ppo,
-        rng: np.random.Generator,
+        rng: np.random.Generator, outputs: int = 2,
     ) -> None:  # fmt: skip
         self.config, self._rng, self._features = config, rng, sum(size for _, size in sizes)
-        self.actor = TorchActor(architecture, sizes, rng)
+        self.actor, self._outputs = TorchActor(architecture, sizes, rng, outputs), outputs
         self._part, num_parts = torch.from_numpy(part), int(part.max()) + 1
         wide = (size + self.actor.units, *_CRITIC, num_parts)
         layers = zip(itertools.pairwise(wide), [math.sqrt(2.0)] * len(_CRITIC) + [1.0], strict=True)
@@ -107,22 +110,24 @@ class Learner:
 
     @torch.no_grad()
     def act(self, seen: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Mean actions (row, 2) and the next recurrent state, from the critic's inputs (row, entry)."""
+        """Mean actions (row, entry) and the next recurrent state, from the critic's inputs (row, entry)."""
         return self.actor.act(seen[:, : self._features], state)
 
     def sample(self, env: Rows, noise: float) -> tuple[Rollout, float]:
         """Samples of ``horizon`` decisions with noisy actions, and the mean reward."""
         config, shape = self.config, (self.config.horizon, env.rows)
         observation = torch.empty((config.horizon + 1, env.rows, env.size))
-        action, mean, expert_action = torch.empty((3, *shape, 2))
+        action, mean, expert_action = torch.empty((3, *shape, self._outputs))
         states = torch.empty((config.horizon + 1, env.rows, self.actor.units))
         reward, ended = np.empty(shape, np.float32), np.zeros((config.horizon + 1, env.rows), np.bool_)
-        acted = torch.empty(shape)
+        acted, used = torch.empty(shape), torch.ones((*shape, self._outputs))
         mean_reward, first = 0.0, self.state
         for t in range(config.horizon):
             observation[t] = torch.from_numpy(env.observation)
             mean[t], states[t] = self.act(observation[t], self.state)
-            drawn, acts = self._rng.standard_normal((env.rows, 2), np.float32), mean[t]
+            drawn, acts = self._rng.standard_normal((env.rows, self._outputs), np.float32), mean[t]
+            if self._outputs > 2:
+                used[t, :, 2:] = torch.from_numpy(env.sends[:, None])
             if self.imitating or self.imitation_weight:
                 expert_action[t], done = map(torch.from_numpy, env.query_expert(acts.numpy()))
                 acts = done if self.imitating else acts
@@ -143,8 +148,9 @@ class Learner:
         value = self.value(*rows).reshape(config.horizon + 1, -1)
         advantage = gae(reward, value, ended[1:], config.gamma, config.gae_lambda)
         continues = torch.from_numpy(~ended[:-1]).float()
-        arrays = torch.from_numpy(advantage), torch.from_numpy(advantage + value[:-1]), continues, acted, part[:-1]
-        return Rollout(observation[:-1], action, mean, expert_action, *arrays, first), mean_reward
+        learned = torch.from_numpy(advantage), torch.from_numpy(advantage + value[:-1]), continues
+        arrays = observation[:-1], action, mean, expert_action, *learned, acted, used, part[:-1], first
+        return Rollout(*arrays), mean_reward
 
     def update(self, batch: Rollout, noise: float, learning_rate: float) -> tuple[float, float]:
         """Train actor and critic on a batch, by PPO or by imitation of the expert; ``Record.kl`` and ``explained``."""
@@ -173,20 +179,23 @@ class Learner:
 
     def _descend(self, batch: Rollout, rows: Tensor, noise: float) -> float:
         """One gradient step on some rows; the divergence from the policy that sampled, or from the expert."""
-        x, action, old, expert_action, advantage, returns, continues, acted, part = (
-            array.index_select(1, rows) for array in batch[:9]
+        x, action, old, expert_action, advantage, returns, continues, acted, used, part = (
+            array.index_select(1, rows) for array in batch[:10]
         )
         new, states = self.actor.through(x[:, :, : self._features], batch.state[rows], continues)
-        action, old, expert_action = (array.reshape(-1, 2) for array in (action, old, expert_action))
+        action, old, expert_action, used = (
+            array.reshape(-1, self._outputs) for array in (action, old, expert_action, used)
+        )
         weight = acted.reshape(-1) / acted.sum().clamp(min=1.0)  # in a minibatch all vehicles may be lost
         advantage, part = advantage.reshape(-1), part.reshape(-1)
         double = 2.0 * noise * noise
-        ratio = (((action - old).square() - (action - new).square()).sum(-1) / double).exp()
+        ratio = ((used * ((action - old).square() - (action - new).square())).sum(-1) / double).exp()
         clipped = ratio.clamp(1.0 - self.config.clip, 1.0 + self.config.clip)
-        apart = weight @ (new - (expert_action if self.imitating else old)).square().sum(-1)
+        imitated = (new - expert_action).square().sum(-1)
+        apart = weight @ (imitated if self.imitating else (used * (new - old).square()).sum(-1))
         loss = apart if self.imitating else -weight @ torch.minimum(ratio * advantage, clipped * advantage)
         if self.imitation_weight:
-            loss = loss + self.imitation_weight * (weight @ (new - expert_action).square().sum(-1))
+            loss = loss + self.imitation_weight * (weight @ imitated)
         prediction = self._critic_output(x.reshape(-1, x.shape[2]), states.detach(), part)
         self._optimiser.zero_grad()
         (loss + weight @ (prediction - returns.reshape(-1)).square()).backward()

@@ -45,10 +45,10 @@ class ExternalActionPolicy(Policy):
     def __init__(self, scenario: Scenario, num_worlds: int, card: Card) -> None:
         self.requirements = card.requirements
         super().__init__(scenario, num_worlds)
-        self.action = np.zeros((num_worlds, scenario.swarm.num_vehicles, 2), np.float32)
+        self.action = np.zeros((num_worlds, scenario.swarm.num_vehicles, scenario.action_size), np.float32)
 
     def decide(self, percept: Percept) -> Float32:  # noqa: ARG002
-        """Actions of shape (world, vehicle, 2)."""
+        """Actions of shape (world, vehicle, ``scenario.action_size``)."""
         return self.action.copy()
 
 
@@ -83,8 +83,8 @@ class Group:
         return self.env.reset(seeds, worlds)
 
     def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
-        """The expert's actions, and those to execute, in its own worlds the expert's; shape (row, 2)."""
-        expert_action = cast(Policy, self._expert).act(self.env.swarm.percept).reshape(-1, 2).copy()
+        """The expert's actions, and those to execute, in its own worlds the expert's; shape (row, entry)."""
+        expert_action = cast(Policy, self._expert).act(self.env.swarm.percept).reshape(action.shape).copy()
         return expert_action, np.where(np.repeat(self._expert_acts, self._shape[1])[:, None], expert_action, action)
 
     def step(self, action: Float32, seeds: Seeds) -> tuple[Transition, Float32]:
@@ -93,7 +93,7 @@ class Group:
         acted = env.swarm.state.alive.reshape(-1).copy()
         action = action.copy()
         bound(action, in_disc(self._network_action))
-        action = action.reshape(*self._shape, 2)
+        action = action.reshape(*self._shape, -1)
         if self._acting is not self._network_action:
             self._network_action.action[...] = action
             action = self._acting.act(env.swarm.percept)
@@ -151,19 +151,24 @@ class Rows:
             started = group.start([int(seed) for seed in seeds(len(worlds))], worlds)
             self.observation[rows] = group.seen(started)
 
+    @property
+    def sends(self) -> Bool:
+        """Vehicles that send the messages of their next actions, shape (row,)."""
+        return np.concatenate([group.env.swarm.sends.reshape(-1) for group in self.groups])
+
     def schedule(self, collision_cost: float, expert_share: float) -> None:
         """Set the cost of a collision beyond the reward, and the share of starting worlds in which the expert acts."""
         for group in self.groups:
             group.collision_cost, group.expert_share = collision_cost, expert_share
 
     def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
-        """The expert's actions, and the actions to execute where the network's are ``action``; all (row, 2)."""
+        """The expert's actions, and the actions to execute where the network's are ``action``; all (row, entry)."""
         pairs = [group.query_expert(action[rows]) for group, rows in zip(self.groups, self._rows, strict=True)]
         expert_actions, executed = zip(*pairs, strict=True)
         return np.concatenate(expert_actions), np.concatenate(executed)
 
     def step(self, action: Float32) -> Transition:
-        """Step all worlds with actions (row, 2)."""
+        """Step all worlds with actions (row, entry)."""
         transitions: list[Transition] = []
         for group, rows in zip(self.groups, self._rows, strict=True):
             transition, self.observation[rows] = group.step(action[rows], self._seeds)

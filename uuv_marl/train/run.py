@@ -129,7 +129,8 @@ class Trainer:
         self.training, self._rng = training, np.random.default_rng(training.seed)
         self.rows = Rows(training, lambda num: self._rng.integers(*TRAINING_SEEDS, num))
         self.learner = Learner(
-            training.network, training.card.sizes, self.rows.size, self.rows.part, training.ppo, self._rng
+            training.network, training.card.sizes, self.rows.size, self.rows.part, training.ppo, self._rng,
+            2 + training.card.message_entries,
         )  # fmt: skip
         if checkpoint is not None:
             self.restore(checkpoint)

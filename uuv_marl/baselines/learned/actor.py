@@ -48,12 +48,12 @@ class Actor(Policy):
         state[worlds] = self._network.step(self._network.gates(z), before).reshape(state[worlds].shape)
 
     def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
+        """Actions of shape (world, vehicle, ``scenario.action_size``)."""
         z = self._features(percept, self.active)
         state = self.memory.state[self.active].reshape(-1, self.axes["unit"]) if self.Memory else None
         action = self._network.output(z, state)
         bound(action, in_disc(self))
-        whole = np.zeros((*percept.flat.shape[:2], 2), np.float32)
+        whole = np.zeros((*percept.flat.shape[:2], action.shape[1]), np.float32)
         whole[self.active] = action.reshape(-1, *whole.shape[1:])
         return whole
 
@@ -68,12 +68,14 @@ class Actor(Policy):
 
 @compiled
 def bound(action: Float32, disc: bool) -> None:
-    """Clip actions (row, 2) to [-1, 1], as trainers do, and project them onto the unit disc if asked, in place."""
+    """Clip actions (row, entry) to [-1, 1], as trainers do, and project forces onto the disc if asked, in place."""
     for i in range(action.shape[0]):
         a_x, a_y = min(max(action[i, 0], -1.0), 1.0), min(max(action[i, 1], -1.0), 1.0)
         if disc:
             a_x, a_y = project(a_x, a_y)
         action[i, 0], action[i, 1] = a_x, a_y
+        for k in range(2, action.shape[1]):
+            action[i, k] = min(max(action[i, k], -1.0), 1.0)
 
 
 def in_disc(policy: Policy) -> bool:

@@ -72,6 +72,10 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
     """Inner loop of the training [N m s]."""
     channels: tuple[str, ...] = ()
     """Channels beyond the percept."""
+    message_entries: int = 0
+    """Numbers in a message that the network sends."""
+    message_vectors: int = 0
+    """Vectors among them."""
     vehicle: dict[str, float | str]
     """Hull and actuators of the training, by field of the scenario."""
     training: dict[str, Any] = {}
@@ -95,8 +99,9 @@ class Card(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False)
         torque = float(self.vehicle.get("actuators.max_torque_nm", FULL_TORQUE_NM))
         force = self.vehicle.get("actuators.kind") != "rudder"
         return PolicyRequirements(
-            self.channels, self.yaw_damping_nms, torque, self.decision_period_s, outputs_force=force
-        )
+            self.channels, self.yaw_damping_nms, torque, self.decision_period_s, outputs_force=force,
+            message_entries=self.message_entries, message_vectors=self.message_vectors,
+        )  # fmt: skip
 
 
 class Checkpoint(NamedTuple):
@@ -120,7 +125,8 @@ def card_of(scenario: Scenario, **more: Any) -> Card:
     return Card(
         percept=card_rows(scenario), decision_period_s=scenario.timing.decision_period_s,
         yaw_damping_nms=scenario.actuators.yaw_damping_nms, channels=scenario.sonar.channels,
-        vehicle=vehicle_of(scenario), **more,
+        vehicle=vehicle_of(scenario), message_entries=scenario.modem.message_entries,
+        message_vectors=scenario.modem.message_vectors, **more,
     )  # fmt: skip
 
 
@@ -177,7 +183,7 @@ def _reason(error: Exception) -> str:
 def _check(checkpoint: Checkpoint) -> None:
     """Raise ValueError if weights are missing, not finite, or of another shape than the card's."""
     card, tensors = checkpoint.card, checkpoint.tensors
-    for name, shape in shapes(card.network, card.sizes).items():
+    for name, shape in shapes(card.network, card.sizes, 2 + card.message_entries).items():
         array = tensors[name]
         if array.dtype != np.float32 or array.shape != shape:
             raise ValueError(f"{name} is {array.dtype} {array.shape}, expected float32 {shape}")

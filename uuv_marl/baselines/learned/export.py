@@ -28,7 +28,7 @@ OPSET = 18  # version of ONNX's operators: the first that has every operator in 
 
 
 def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
-    """Write a network as an ONNX model that maps observations (vehicle, size) to actions (vehicle, 2), float32.
+    """Write a network as an ONNX model that maps observations (vehicle, size) to actions (vehicle, entry), float32.
 
     Observations are those of an environment with ``observe="closeness"``. A recurrent network also takes its state
     (vehicle, unit), zeros at first, and returns the next one.
@@ -56,8 +56,12 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
     if network.architecture.memory:
         state = graph("Identity", network.step(network.gates(z), Value(graph, "state")), name="next_state")
     clipped = graph("Clip", network.output(z, state), np.float32(-1.0), np.float32(1.0))
-    longest = graph("ReduceL2", clipped, np.array([-1])) if in_disc(actor) else np.float32(1.0)
-    graph("Div", clipped, graph("Max", longest, np.float32(1.0)), name="action")
+    entries = actor.checkpoint.card.message_entries
+    force, message = (graph.take(clipped, np.arange(*ends)) for ends in ((0, 2), (2, 2 + entries)))
+    longest = graph("ReduceL2", force, np.array([-1])) if in_disc(actor) else np.float32(1.0)
+    bounded = graph("Div", force, graph("Max", longest, np.float32(1.0)), name="" if entries else "action")
+    if entries:
+        graph("Concat", bounded, message, axis=1, name="action")
     model = _model(actor, graph)
     onnx.checker.check_model(model, full_check=True)  # pyright: ignore[reportUnknownMemberType] - of a path
     with writing(path):
@@ -71,8 +75,9 @@ def _model(policy: Actor, graph: "Graph") -> onnx.ModelProto:
     units = [f"{row.quantity.scale:g} {row.quantity.unit}".removesuffix(" 1") for row in layout.table]
     fields = ", ".join(f"{row.name} {row.size} [{unit}]" for row, unit in zip(layout.table, units, strict=True))
     sees = f"As closeness, body frame; name, size and unit of each part: {fields}."
-    acts = "Surge force and yaw torque [full force, full torque], within the unit disc."
-    takes, gives = [_tensor("observation", layout.size, sees)], [_tensor("action", 2, acts)]
+    size = policy.scenario.action_size
+    acts = "Surge force and yaw torque [full force, full torque], within the unit disc" + ", and a message" * (size > 2)
+    takes, gives = [_tensor("observation", layout.size, sees)], [_tensor("action", size, f"{acts}.")]
     if checkpoint.card.network.memory:
         units_of = checkpoint.card.network.hidden[-1]
         takes.append(_tensor("state", units_of, "State of the recurrent layer; zeros at an episode's start."))

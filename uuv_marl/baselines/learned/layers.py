@@ -48,8 +48,8 @@ def columns(sizes: Sizes) -> tuple[dict[str, Int64], Int64]:
     return sectors, np.concatenate(rest)
 
 
-def shapes(architecture: Architecture, sizes: Sizes) -> dict[str, tuple[int, ...]]:
-    """Shape of each tensor of a network for such observations, by name; weights are (in, out)."""
+def shapes(architecture: Architecture, sizes: Sizes, outputs: int = 2) -> dict[str, tuple[int, ...]]:
+    """Shape of each tensor of a network from such observations to actions, by name; weights are (in, out)."""
     width, tensor_shapes = sum(size for _, size in sizes), dict[str, tuple[int, ...]]()
     if architecture.kind == "sectors":
         sectors, rest = columns(sizes)
@@ -64,7 +64,7 @@ def shapes(architecture: Architecture, sizes: Sizes) -> dict[str, tuple[int, ...
         tensor_shapes |= {"gru.weight": (width, 3 * units), "gru.bias": (3 * units,)}
         tensor_shapes |= {"gru.state_weight": (units, 3 * units), "gru.state_bias": (3 * units,)}
         width += units
-    for k, units in enumerate((*architecture.hidden, 2)):
+    for k, units in enumerate((*architecture.hidden, outputs)):
         tensor_shapes |= {f"{k}.weight": (width, units), f"{k}.bias": (units,)}
         width = units
     return tensor_shapes

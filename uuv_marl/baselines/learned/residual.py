@@ -21,9 +21,9 @@ class ResidualPolicy(Policy):
         super().__init__(scenario, num_worlds)
 
     def decide(self, percept: Percept) -> Float32:
-        """Actions of shape (world, vehicle, 2)."""
-        base, added = (self.decide_part(name, percept) for name in self.parts)
-        action: Float32 = (base + np.float32(SHARE) * added).astype(np.float32)
-        bound(action.reshape(-1, 2), in_disc(self))
+        """Actions, and the network's messages, shape (world, vehicle, ``scenario.action_size``)."""
+        base, action = (self.decide_part(name, percept) for name in self.parts)
+        action[:, :, :2] = base + np.float32(SHARE) * action[:, :, :2]
+        bound(action.reshape(-1, action.shape[2]), in_disc(self))
         self.clamps[...] = self.parts["base"].clamps
         return action

@@ -43,6 +43,8 @@ def signs_of(scene: Scene) -> list[tuple[str, Sign]]:
     signs += [(near, _dart(ink.AMBER)), ("collision", _all(_cross(ink.ORANGE, 3.0), _circle(ink.ORANGE, width=1.5)))]
     if scene.scenario.loses_vehicles:
         signs.append(("lost", _cross(ink.LOST, 3.5)))
+    if scene.scenario.modem.message_entries:
+        signs.append(("sends a message", _all(_circle(ink.PINK, 4.0, 1.0), _circle(ink.PINK, width=1.0))))
     if scene.water is not None:
         signs.append((f"current, {shown_speed(scene.scenario):g} m/s", _current))
     if scene.sonar is not None:

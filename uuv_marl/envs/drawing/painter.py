@@ -144,6 +144,9 @@ class Painter:
             pygame.draw.polygon(self._fine, colours[i], darts[i].tolist())
         for i in np.flatnonzero(scene.alive & ~scene.groups.informed):
             pygame.draw.polygon(self._fine, ink.WHITE, ((darts[i] + places[i]) / 2.0).tolist())
+        for i in np.flatnonzero(scene.sending):
+            for radius in (0.9 * length + 4 * unit, 1.5 * length + 8 * unit):
+                pygame.draw.circle(self._fine, ink.PINK, places[i].tolist(), radius, round(1.5 * unit))
         if scene.sonar:
             i = scene.sonar.vehicle
             pygame.draw.polygon(self._fine, ink.PINK, darts[i].tolist())

@@ -51,6 +51,8 @@ class Scene(NamedTuple):
     """False for lost vehicles, shape (vehicle,)."""
     near: Bool
     """Nearer than s_u to another vehicle, or than s_o to an obstacle, shape (vehicle,)."""
+    sending: Bool
+    """Began to send a message in the latest decision, shape (vehicle,)."""
     trail: Sequence[Float]
     """Past positions, the oldest first, shape (vehicle, 2) each."""
     hits: Float
@@ -128,6 +130,7 @@ class SceneHistory:
             heading=state.eta[w, :, 2].copy(),
             alive=alive,
             near=alive & ((facts.spacing[w] < constraints.s_u_m) | (facts.clearance[w] < constraints.s_o_m)),
+            sending=swarm.sent[w],
             trail=list(self._trails[w]),
             hits=np.array(self._hits[w]).reshape(-1, 3),
             arrival_s=arrival_s if np.isfinite(arrival_s) and swarm.task.has_goal else None,

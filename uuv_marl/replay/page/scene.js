@@ -28,6 +28,7 @@ export function drawScene(context, episode, time, poses, view, look) {
   const shown = look.selected !== null && episode.inspected.indexOf(look.selected);
   if (shown >= 0 && shown !== false) drawSonar(context, episode, shown, sample, poses, view, look.palette);
   drawVehicles(context, episode, sample, poses, view, size, look);
+  drawMessages(context, episode, sample, poses, view, size, look.palette);
   drawMarks(context, episode, poses, view, size, look);
   episode.paths.forEach(({ team, corners }, path) => {
     const colour = look.palette.teams[team] ?? look.palette.reference;
@@ -104,6 +105,22 @@ function drawVehicles(context, episode, sample, poses, view, size, look) {
       if (hollow) context.stroke();
     }
   }
+}
+
+/** Two rings around those who send a message. */
+function drawMessages(context, episode, sample, poses, view, size, palette) {
+  const sending = episode.values("sending");
+  if (!sending) return;
+  context.lineWidth = 1.5;
+  context.strokeStyle = palette.echo;
+  context.beginPath();
+  for (let i = 0; i < episode.vehicles; i++) {
+    if (!sending[sample * episode.vehicles + i]) continue;
+    const [x, y] = [view.x(poses[3 * i + 1]), view.y(poses[3 * i])];
+    circle(context, x, y, 0.9 * size + 4);
+    circle(context, x, y, 1.5 * size + 8);
+  }
+  context.stroke();
 }
 
 /** Rings around the inspected, and the selected vehicle's name. */

@@ -9,17 +9,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import FIELDS, DisturbanceFields, Starts
+from uuv_marl.percept import FIELDS, NUM_RECENT, DisturbanceFields, Starts
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.conditions import vehicle_disturbances
 from uuv_marl.sim.arrays import State, World, WorldMap
 from uuv_marl.sim.compiled import compiled_inner
-from uuv_marl.sim.disturbances import actuation, current, modem, navigation, noise, readings, schedule
+from uuv_marl.sim.disturbances import actuation, current, modem, navigation, noise, packets, readings, schedule
 from uuv_marl.sim.model import Rules
 from uuv_marl.sim.tables import allocate
 from uuv_marl.sim.views import disturbance_fields, fields
 from uuv_marl.sim.workspace import Columns
-from uuv_marl.types import UInt64
+from uuv_marl.types import Float32, UInt64
 
 DISTURBANCE_CHANNELS = tuple(dict.fromkeys(FIELDS[name].channel for name in DisturbanceFields._fields))
 """Channels that only a disturbed world's code writes."""
@@ -46,6 +46,8 @@ class Disturbances(NamedTuple):
     navigation_errors: navigation.NavigationErrors
     modem_model: modem.ModemModel
     messages: modem.Messages
+    packet_model: packets.PacketModel
+    packets: packets.Packets
 
 
 def make_disturbances(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]) -> Disturbances | None:
@@ -59,8 +61,9 @@ def make_disturbances(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]
     if not vehicle_disturbances(scenario) and not set(DISTURBANCE_CHANNELS) & set(scenario.sonar.channels):
         return None
     own = {"eddy": scenario.max_eddies, "plant": actuation.PLANT, "fault": len(scenario.faults)}
-    peers = sizes["vehicle"] if "modem" in scenario.sonar.channels else 0
-    sizes = {**sizes, **own, **readings.line_sizes(scenario), "peer": peers}
+    n, entries = sizes["vehicle"], scenario.modem.message_entries
+    own |= {"peer": n * ("modem" in scenario.sonar.channels), "modem": n * (entries > 0)}
+    sizes = {**sizes, **own, **readings.line_sizes(scenario), "message_entry": entries, "recent": NUM_RECENT}
     return Disturbances(
         keys=keys,
         water=current.water(scenario),
@@ -77,6 +80,8 @@ def make_disturbances(scenario: Scenario, keys: UInt64, sizes: Mapping[str, int]
         navigation_errors=allocate(navigation.NavigationErrors, sizes),
         modem_model=modem.modem_model(scenario),
         messages=allocate(modem.Messages, sizes),
+        packet_model=packets.packet_model(scenario),
+        packets=allocate(packets.Packets, sizes),
     )
 
 
@@ -89,12 +94,15 @@ def sample_disturbances(w: int, scenario: Scenario, world_map: WorldMap, duratio
     noise.sample_sensor_errors(w, key, d.noise_model, d.sensor_errors)
     navigation.sample_navigation_errors(w, key, d.compass_bias, d.navigation_errors)
     d.messages.sent[w], d.messages.received[w] = -1.0, -1.0
+    packets.begin_packets(w, key, d.packet_model, d.packets)
 
 
 def disturbance_tables(disturbances: Disturbances | None) -> tuple[Any, ...]:
     """All arrays that change, for snapshots."""
     d = disturbances
-    return () if d is None else (d.flow, d.hull, d.delay_line, d.sensor_errors, d.navigation_errors, d.messages)
+    if d is None:
+        return ()
+    return (d.flow, d.hull, d.delay_line, d.sensor_errors, d.navigation_errors, d.messages, d.packets)
 
 
 @compiled_inner
@@ -112,13 +120,20 @@ def advance_disturbances(w: int, world: World, d: Disturbances) -> None:
     navigation.drift_position(w, world.state, d.drift_share, d.navigation_errors)
     readings.remember(w, world.state, d.delay_line)
     modem.exchange(w, d.keys[w], world, d.modem_model, d.messages, d.flow, d.navigation_errors)
+    packets.transmit(w, d.keys[w], world, d.packet_model, d.packets)
+
+
+@compiled_inner
+def load_messages(w: int, action: Float32, world: World, d: Disturbances) -> None:
+    """Take the messages that a decision's actions hold, shape (world, vehicle, 2 + entry)."""
+    packets.load_entries(w, action, world, d.packet_model, d.navigation_errors, d.packets)
 
 
 @compiled_inner
 def begin_disturbances(w: int, world: World, d: Disturbances) -> None:
     """Start the disturbances from the present states, after a reset or once states were written by hand."""
     current.read_flow(w, world.state.eta, d.water.core, d.flow)
-    d.navigation_errors.position_error[w] = 0.0
+    navigation.begin_navigation(w, world.state, d.navigation_errors)
     noise.schedule_outages(w, d.keys[w], d.noise_model, d.sensor_errors)
     readings.begin_line(w, world.state, d.delay_line)
     modem.exchange(w, d.keys[w], world, d.modem_model, d.messages, d.flow, d.navigation_errors)
@@ -151,5 +166,7 @@ def apply_disturbances(w: int, world: World, at: Starts, d: Disturbances) -> Non
     noise.write_ranged(w, world.state.alive, d.sonar_timing, d.noise_model, more)
     current.write_velocities(w, world, d.water, d.flow, see, more)
     modem.write_messages(w, world, d.messages, d.navigation_errors, more)
+    packets.write_packets(w, world, d.packet_model, d.navigation_errors, d.packets, more)
+    navigation.write_odometry(w, world, d.navigation_errors, more)
     if d.drift_share != 0.0 or d.compass_bias != 0.0:
         navigation.navigate(w, world, d.navigation_errors, see)

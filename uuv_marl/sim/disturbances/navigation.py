@@ -9,10 +9,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import Fields
+from uuv_marl.percept import DisturbanceFields, Fields
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
-from uuv_marl.sim.perception import saturate, write_reference
+from uuv_marl.sim.perception import saturate, toward, write_reference
 from uuv_marl.sim.random import COMPASS, DRIFT, normal, uniform
 from uuv_marl.sim.tables import described
 from uuv_marl.sim.trigonometry import cos_sin
@@ -26,6 +26,7 @@ class NavigationErrors(NamedTuple):
     drift_direction: Annotated[Float64, "world vehicle 2", "Direction of its drift, a unit vector north and east."]
     position_error: Annotated[Float64, "world vehicle 2", "Estimated less true position, north and east [m]."]
     bias: Annotated[Float64, "world vehicle 2", "Cosine and sine of its compass's bias, clockwise."]
+    start_position: Annotated[Float64, "world vehicle 2", "Position at the start, north and east [m]."]
 
 
 def sample_navigation_errors(w: int, key: np.uint64, compass_bias: float, errors: NavigationErrors) -> None:
@@ -66,3 +67,23 @@ def navigate(w: int, world: World, errors: NavigationErrors, see: Fields) -> Non
         write_reference(w, i, (x, y, c, s), world, see)
         if see.compass.shape[2] > 0:
             see.compass[w, i, 0], see.compass[w, i, 1] = saturate(c, 1.0), saturate(s, 1.0)
+
+
+@compiled_inner
+def begin_navigation(w: int, state: State, errors: NavigationErrors) -> None:
+    """Note where world w's vehicles are, without an error."""
+    errors.position_error[w] = 0.0
+    for i in range(state.eta.shape[1]):
+        errors.start_position[w, i, 0], errors.start_position[w, i, 1] = state.eta[w, i, 0], state.eta[w, i, 1]
+
+
+@compiled_inner
+def write_odometry(w: int, world: World, errors: NavigationErrors, more: DisturbanceFields) -> None:
+    """Write the motion since the start into the percepts of world w as each vehicle's navigation estimates it."""
+    eta, heading = world.state.eta, world.senses.heading
+    for i in range(eta.shape[1] if more.odometry.shape[2] else 0):
+        if world.state.alive[w, i]:
+            c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], errors)
+            dx = eta[w, i, 0] + errors.position_error[w, i, 0] - errors.start_position[w, i, 0]
+            dy = eta[w, i, 1] + errors.position_error[w, i, 1] - errors.start_position[w, i, 1]
+            more.odometry[w, i, 0], more.odometry[w, i, 1] = toward(dx, dy, c, s)
