@@ -5,6 +5,7 @@ import pytest
 
 from tests.swarms import batched, fly, piloted, started
 from uuv_marl.baselines import make_policy
+from uuv_marl.benchmark.evaluate import evaluate
 from uuv_marl.envs.state import global_state, state_layout
 
 TIERS = ("few_informed_easy", "few_informed", "few_informed_hard")
@@ -163,3 +164,11 @@ def test_who_has_no_gamma_agent_keeps_its_velocity():
     swarm.observe()
     fly(swarm, policy, 40)
     np.testing.assert_allclose(swarm.state.nu[0, alone], (1.5, 0.0, 0.0), atol=0.05)
+
+
+def test_one_broadcast_a_round_brings_all_even_over_hops_and_with_losses():
+    """By a slow, short and lossy modem; without messages the same gains lead fewer."""
+    poor = {"modem.range_m": 60.0, "modem.guard_m": 60.0, "modem.loss_probability": 0.3}
+    for overrides in ({}, poor):
+        rows = evaluate("leader_broadcast", "few_informed", range(70_000, 70_008), overrides=overrides)
+        assert np.mean([row["task"]["uninformed_share"] for row in rows]) > 0.9

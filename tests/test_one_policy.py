@@ -20,6 +20,7 @@ KINDS = {
     "random": ("lossy", LOSES),  # a random generator
     "random,safety_filter=true": ("starter", {}),
     "leader_follower": ("few_informed", {}),  # observations that others lack
+    "leader_broadcast": ("few_informed", {}),  # messages
     "oracle": ("hard_water", {}),
 }
 

@@ -4,7 +4,15 @@ import re
 
 from uuv_marl.baselines import random_idle
 from uuv_marl.baselines.bug.controller import TangentBug
-from uuv_marl.baselines.comparators import apf, leader_follower, olfati_saber, oracle, orca, proportional
+from uuv_marl.baselines.comparators import (
+    apf,
+    leader_broadcast,
+    leader_follower,
+    olfati_saber,
+    oracle,
+    orca,
+    proportional,
+)
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
 from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.names import parse_name
@@ -42,6 +50,7 @@ POLICIES: dict[str, PolicyType] = {
     "olfati_saber_informed": olfati_saber.OlfatiSaberInformed,
     "orca_informed": orca.OrcaInformed,
     "leader_follower": leader_follower.LeaderFollower,
+    "leader_broadcast": leader_broadcast.LeaderBroadcast,
     "proportional_tracking": proportional.ProportionalTracking,
     "oracle": oracle.Oracle,
     "tangent_bug": TangentBug,

@@ -89,6 +89,9 @@ SPACES: dict[str, Space] = {
     "leader_follower": Space(
         _RANGES["leader_follower"] | _RANGES["filter"], leader_follower.LeaderFollowerGains, FEW, Barrier()
     ),
+    "leader_broadcast": Space(
+        _RANGES["leader_follower"] | _RANGES["filter"], leader_follower.LeaderFollowerGains, FEW, Barrier()
+    ),
 }
 """Search spaces of all tuned policies. ``POLICY.TASK`` are gains for a task, which ``tuned_for`` selects."""
 

@@ -49,9 +49,13 @@ class LeaderFollower(Filtered):
     Gains = LeaderFollowerGains
     tuned_as = "leader_follower"
 
+    @staticmethod
+    def leads(percept: Percept) -> Float32:
+        """1 for informed vehicles, all where there is no such field, shape (world, vehicle, 1)."""
+        return percept["informed"] if "informed" in percept.names else np.ones_like(percept["yaw_rate"])
+
     def _write(self, percept: Percept, action: Float32) -> None:
-        leads = percept["informed"] if "informed" in percept.names else np.ones_like(action[..., :1])
-        _act(leads, self.active, self.float_gains, self.safe, self.surroundings, action)
+        _act(self.leads(percept), self.active, self.float_gains, self.safe, self.surroundings, action)
 
 
 Others = tuple[float, float, float, float]
@@ -81,7 +85,7 @@ def at_most(x: float, y: float, length: float) -> tuple[float, float]:
 
 
 @compiled
-def _following(others: Others, g: LeaderFollowerGains) -> tuple[float, float]:
+def following(others: Others, g: LeaderFollowerGains) -> tuple[float, float]:
     """Desired velocity of a follower [m/s]."""
     v_x, v_y, x, y = others
     w_x, w_y = at_most(g.follow * v_x, g.follow * v_y, g.cruise)
@@ -90,7 +94,7 @@ def _following(others: Others, g: LeaderFollowerGains) -> tuple[float, float]:
 
 
 @compiled
-def _leading(w: int, i: int, others: Others, g: LeaderFollowerGains, memory: Surroundings) -> tuple[float, float]:
+def leading(w: int, i: int, others: Others, g: LeaderFollowerGains, memory: Surroundings) -> tuple[float, float]:
     """Desired velocity of a leader [m/s]."""
     at, speed = memory.reference[w, i], memory.reference_speed[w, i]
     to_x, to_y = at[0] - memory.pose[w, i, 0], at[1] - memory.pose[w, i, 1]
@@ -109,7 +113,7 @@ def _act(
         for i in range(action.shape[1]):
             if worlds[w] and memory.begun[w, i] > 0.0:
                 others = remembered(w, i, g, memory)
-                desired = _leading(w, i, others, g, memory) if leads[w, i, 0] > 0.0 else _following(others, g)
+                desired = leading(w, i, others, g, memory) if leads[w, i, 0] > 0.0 else following(others, g)
                 w_x, w_y = pushed(desired[0], desired[1], w, i, g.push, g.push_range, memory)
                 w_x, w_y = modulated(w_x, w_y, w, i, safe.barrier, memory)
                 num = planes_of(w, i, safe, memory)
