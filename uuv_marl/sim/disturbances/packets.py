@@ -1,11 +1,11 @@
 """Messages that policies choose: numbers of an action, sent in the vehicle's own slot and received once sound arrives.
 
 In a slot a vehicle sends the numbers of the action in force, rounded to ``modem.bits_per_entry``; vectors among them
-are sent north and east by its compass, and read by the receiver's in its body frame. The message arrives
-once it has been sent and sound has travelled from the place of the sender then to the receiver, within
-``modem.range_m``; each receiver loses it with a probability. With TDMA the slots of a round go to the vehicles in
-order. With slotted ALOHA (Abramson 1970) each vehicle sends in random slots; messages of a slot whose senders are in a
-receiver's range destroy each other, and a vehicle that sends does not receive.
+are sent north and east by its compass, and read by the receiver's in its body frame. The message arrives once it has
+been sent and sound has travelled from the place of the sender then to the receiver, within ``modem.range_m``; each
+receiver loses it with a probability. With TDMA the slots of a round go to the vehicles in order. With slotted ALOHA
+(Abramson 1970) each vehicle sends in random slots; messages of a slot whose senders are in a receiver's range destroy
+each other, and a vehicle that sends does not receive.
 """
 
 import math
