@@ -92,6 +92,11 @@ class EnvPolicy:
     def _act(self, index: Int64, observations: NDArray[Any]) -> Float32:
         """Actions of these rows, ``world * vehicles + i``, shape (row, 2), from their observations (row, entry)."""
         percept, layout = self._swarm.percept, self.policy.layout
+        if observations.shape[1:] != (layout.size,):
+            raise PolicyError(
+                f"an observation of this environment has {layout.size} entries, got {observations.shape[1:]}; give the "
+                "policy what the environment returns"
+            )
         with rounding():
             rows = Percept.from_observation(observations.astype(np.float32), layout).flat
         clock = cast(Clock, percept.clock)

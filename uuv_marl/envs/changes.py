@@ -56,7 +56,7 @@ def changed(scenario: ScenarioLike, for_policy: str | None = None, **changes: Un
     for name in changes.keys() - Changes.__annotations__.keys():
         usual = {"max_episode_steps": "max_cycles"}.get(name, name)  # Gymnasium's name
         near = hint(usual, EnvOptions.__annotations__, 0.6)
-        raise TypeError(f"this environment has no argument {name!r}; {near}Fields of the scenario go into overrides")
+        raise TypeError(f"there is no argument {name!r}; {near}Fields of the scenario go into overrides")
     overrides = changes.get("overrides") or {}
     if not isinstance(cast(object, overrides), Mapping):
         return load_scenario(scenario, overrides=overrides)  # which says what overrides must be

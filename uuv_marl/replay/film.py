@@ -73,7 +73,7 @@ def write_film(
         if suffix == ".png":
             moments = np.linspace(0.0, longest, _MOMENTS).tolist()
             scenes = [(one, one.scene_at(now, sonar_of), now) for one in recordings for now in moments]
-            panels = [Panel(f"{one.policy} at {scene.time_s:.0f} s", scene, now) for one, scene, now in scenes]
+            panels = [Panel(f"{one.policy} at {scene.time_s:.1f} s", scene, now) for one, scene, now in scenes]
             still = pixels(draw_frame(panels, size, camera, heading, columns=_MOMENTS))
             Image.fromarray(still).save(partial, optimize=True)
             return

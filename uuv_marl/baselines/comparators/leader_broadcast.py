@@ -4,7 +4,7 @@ A message holds l(t)'s displacement since the start, its velocity and the age of
 vehicle keeps the newest, extrapolates it, and sends it on in its own slots, so that it reaches vehicles beyond
 ``modem.range_m`` over several others. By dead reckoning the vehicle keeps its place relative to l(t), a virtual leader
 (Leonard and Fiorelli, Virtual leaders, artificial potentials and coordinated control of groups, CDC 2001); before the
-first message it follows its neighbours as ``leader_follower`` does, whose gains, pushes and safety filter it has.
+first message it follows its neighbours as ``leader_follower`` does, whose pushes and safety filter it has.
 """
 
 import math
@@ -44,6 +44,7 @@ LeaderBroadcastMemory = with_surroundings("LeaderBroadcastMemory", ToldReference
 class LeaderBroadcast(LeaderFollower):
     """Every vehicle keeps its place relative to l(t), whose motion the informed broadcast."""
 
+    tuned_as = "leader_broadcast"
     Memory: ClassVar[type[Any] | None] = LeaderBroadcastMemory
     requirements = LeaderFollower.requirements._replace(channels=("messages",), message_entries=5, message_vectors=2)
 
