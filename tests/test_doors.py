@@ -42,7 +42,7 @@ def test_percepts_of_others_are_refused(name):
     """Compiled code would read, and write memory, beyond the ends of the policy's arrays."""
     policy, percept = made_for(name)
     good = policy.act(percept)
-    assert good.shape == (2, 5, 2)
+    assert good.shape == (2, 5, 2 + policy.requirements.message_entries)
     other_suite = PerceptLayout.of(load_scenario("single_obstacle", overrides={"sonar.arrays.bow.sub_sectors": 3}))
     for other in (
         made_for(name, worlds=8)[1],

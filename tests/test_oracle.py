@@ -25,7 +25,7 @@ BASE = load_scenario("tracking")
 SIZES = (1, 2, 3, 54, ONE_CELL_UP_TO, ONE_CELL_UP_TO + 1, 300, 600)
 
 
-@pytest.mark.parametrize("overrides", [{}, contract.SEA])
+@pytest.mark.parametrize("overrides", [{}, contract.SEA, contract.TALK])
 def test_without_a_compiler_a_run_is_the_same(overrides):
     """Under NUMBA_DISABLE_JIT=1; actions of policies differ only by rounding to float32."""
     run = """
@@ -39,14 +39,14 @@ scenario = load_scenario("starter", overrides=json.loads(sys.argv[1]))
 swarm = Swarm(scenario, 2)
 swarm.reset(0)
 for _ in range(8):
-    swarm.step(np.full((2, 5, 2), 0.5))
+    swarm.step(np.full((2, 5, scenario.action_size), 0.5))
 bits = {name: array.tobytes().hex() for name, array in swarm.snapshot().items()}
 actions = []
 for name in () if scenario.current.flows else ANYWHERE:
     own = with_policy_requirements(name, scenario)
     swarm, policy = Swarm(own), make_policy(name, own)
     policy.reset(0)
-    actions.append(policy.act(swarm.reset(0)).tolist())
+    actions.extend(policy.act(swarm.reset(0)).ravel().tolist())
 print(json.dumps([bits, actions]))
 """
     (bits, actions), (slow_bits, slow_actions) = (
