@@ -56,7 +56,7 @@ def installed(wheel, tmp_path_factory):
     (["list"], "remus100"),
     (["list", "--show", "starter"], "num_vehicles = 5"),
     (["benchmark", "--scenario", "starter", "--seeds", "1", "--policy", "mappo", "--output", "out"], "Every seed:"),
-    (["replay", "out", "--output", "episode.html"], "episode.html"),
+    (["replay", "--scenario", "starter", "--output", "episode.html"], "episode.html"),
 ], ids=lambda value: "_".join(value[:2]) if isinstance(value, list) else "")  # fmt: skip
 def test_a_command_works_outside_the_checkout(installed, words, says):
     code, output = installed(*words)
