@@ -199,6 +199,13 @@ def test_an_impossible_schedule_is_refused_with_the_remedy(overrides, said):
         load_scenario(STARTER, overrides=TALK | overrides, num_vehicles=12)
 
 
+def test_a_long_wait_stays_within_the_observation_s_bounds():
+    env = parallel_env(STARTER, overrides=TALK | {"modem.period_s": 36_000.0}, num_vehicles=6)
+    observations, _ = env.reset(seed=0)
+    assert all(env.observation_space(agent).contains(own) for agent, own in observations.items())
+    assert env.swarm.percept["time_to_slot"].max() == 4096.0
+
+
 def test_a_silent_policy_sends_zeros_and_keeps_its_forces():
     quiet, env = (parallel_env(STARTER, overrides=own, num_vehicles=6) for own in ({"obstacles": []}, TALK))
     spoken, silent = env.reset(seed=1)[0], quiet.reset(seed=1)[0]

@@ -73,7 +73,8 @@ def write_film(
         if suffix == ".png":
             moments = np.linspace(0.0, longest, _MOMENTS).tolist()
             scenes = [(one, one.scene_at(now, sonar_of), now) for one in recordings for now in moments]
-            panels = [Panel(f"{one.policy} at {scene.time_s:.1f} s", scene, now) for one, scene, now in scenes]
+            panels = [Panel(one.policy, scene, now) for one, scene, now in scenes]
+            heading += f", at {', '.join(f'{now:.0f}' for now in moments)} s"
             still = pixels(draw_frame(panels, size, camera, heading, columns=_MOMENTS))
             Image.fromarray(still).save(partial, optimize=True)
             return

@@ -123,23 +123,22 @@ class Swarm:
     @property
     def sends(self) -> Bool:
         """Vehicles whose next slot begins during the next decision, which sends its message, shape (world, vehicle)."""
-        if self.scenario.modem.message_entries == 0:
-            return np.zeros_like(self.state.alive)
-        disturbances, end_s = cast(Any, self._disturbances), self.facts.time_s + self.scenario.timing.decision_period_s
-        start_s = disturbances.packets.next_slot * disturbances.packet_model.slot_s
-        return self.state.alive & (start_s < end_s[:, None] - 1e-9)
+        end_s = self.facts.time_s + self.scenario.timing.decision_period_s
+        return self.state.alive & (self._slot_starts("next_slot") < end_s[:, None] - 1e-9)
 
     @property
     def sent(self) -> Bool:
         """Vehicles that began to send a message during the latest decision, shape (world, vehicle)."""
-        if self.scenario.modem.message_entries == 0:
-            return np.zeros_like(self.state.alive)
-        disturbances, begin_s = (
-            cast(Any, self._disturbances),
-            self.facts.time_s - self.scenario.timing.decision_period_s,
-        )
-        slot = disturbances.packets.packet_slot
-        return (slot >= 0) & (slot * disturbances.packet_model.slot_s > begin_s[:, None] - 1e-9)
+        begin_s = self.facts.time_s - self.scenario.timing.decision_period_s
+        return self._slot_starts("packet_slot") > begin_s[:, None] - 1e-9
+
+    def _slot_starts(self, which: str) -> Float64:
+        """Start of every vehicle's next or latest slot [s], NaN for none, shape (world, vehicle)."""
+        disturbances = self._disturbances
+        if disturbances is None or self.scenario.modem.message_entries == 0:
+            return np.full(self.state.alive.shape, np.nan)
+        slots = getattr(disturbances.packets, which)
+        return np.where(slots >= 0, slots * disturbances.packet_model.slot_s, np.nan)
 
     @property
     def time_limit_s(self) -> Float64:

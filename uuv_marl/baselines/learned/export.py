@@ -57,11 +57,11 @@ def write_onnx(policy: str, scenario: Scenario, path: UserPath) -> None:
         state = graph("Identity", network.step(network.gates(z), Value(graph, "state")), name="next_state")
     clipped = graph("Clip", network.output(z, state), np.float32(-1.0), np.float32(1.0))
     entries = actor.checkpoint.card.message_entries
-    force, message = (graph.take(clipped, np.arange(*ends)) for ends in ((0, 2), (2, 2 + entries)))
+    force = graph.take(clipped, np.arange(2)) if entries else clipped
     longest = graph("ReduceL2", force, np.array([-1])) if in_disc(actor) else np.float32(1.0)
     bounded = graph("Div", force, graph("Max", longest, np.float32(1.0)), name="" if entries else "action")
     if entries:
-        graph("Concat", bounded, message, axis=1, name="action")
+        graph("Concat", bounded, graph.take(clipped, np.arange(2, 2 + entries)), axis=1, name="action")
     model = _model(actor, graph)
     onnx.checker.check_model(model, full_check=True)  # pyright: ignore[reportUnknownMemberType] - of a path
     with writing(path):

@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from uuv_marl.percept import NUM_RECENT, DisturbanceFields
+from uuv_marl.percept import DURATION, NUM_RECENT, DisturbanceFields
 from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arrays import State, World
 from uuv_marl.sim.compiled import compiled, compiled_inner
@@ -82,8 +82,14 @@ def begin_packets(w: int, key: np.uint64, model: PacketModel, packets: Packets) 
     for array in packets:
         array[w] = 0
     packets.packet_slot[w], packets.inbox_s[w], packets.recent_s[w] = -1, -1.0, -1.0
-    for i in range(packets.next_slot.shape[1]):
-        packets.next_slot[w, i] = slot_after(-1, i, key, packets.next_slot.shape[1], model)
+    write_first_slots(key, model, packets.next_slot[w])
+
+
+@compiled
+def write_first_slots(key: np.uint64, model: PacketModel, slots: Int64) -> None:
+    """Write the number of every vehicle's first slot, shape (vehicle,)."""
+    for i in range(slots.shape[0]):
+        slots[i] = slot_after(-1, i, key, slots.shape[0], model)
 
 
 @compiled
@@ -190,6 +196,12 @@ def read(message: Float64, c: float, s: float, vectors: int, out: Float32) -> No
         out[2 * v], out[2 * v + 1] = saturate(c * x + s * y, 1.0), saturate(c * y - s * x, 1.0)
 
 
+@compiled
+def limited(time_s: float) -> float:
+    """A time within the bounds of a percept [s]."""
+    return min(max(time_s, DURATION.low), DURATION.high)
+
+
 @compiled_inner
 def write_packets(
     w: int, world: World, model: PacketModel, errors: NavigationErrors, packets: Packets, more: DisturbanceFields
@@ -200,15 +212,15 @@ def write_packets(
         if not world.state.alive[w, i]:
             continue
         c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], errors)
-        more.time_to_slot[w, i, 0] = max(packets.next_slot[w, i] * model.slot_s - now_s, 0.0)
+        more.time_to_slot[w, i, 0] = limited(packets.next_slot[w, i] * model.slot_s - now_s)
         for k in range(more.neighbour_message_valid.shape[2]):
             j = world.senses.detected_index[w, i, k]
             if j >= 0 and packets.inbox_s[w, i, j] >= 0.0:
                 more.neighbour_message_valid[w, i, k] = 1.0
-                more.neighbour_message_age[w, i, k] = now_s - packets.inbox_s[w, i, j]
+                more.neighbour_message_age[w, i, k] = limited(now_s - packets.inbox_s[w, i, j])
                 read(packets.inbox[w, i, j], c, s, model.vectors, more.neighbour_message[w, i, k])
         for r in range(NUM_RECENT):
             if packets.recent_s[w, i, r] >= 0.0:
                 more.message_valid[w, i, r] = 1.0
-                more.message_age[w, i, r] = now_s - packets.recent_s[w, i, r]
+                more.message_age[w, i, r] = limited(now_s - packets.recent_s[w, i, r])
                 read(packets.recent[w, i, r], c, s, model.vectors, more.message[w, i, r])
