@@ -48,7 +48,8 @@ class Rollout(NamedTuple):
     acted: Tensor
     """1 for vehicles that acted, 0 for those that were lost before."""
     used: Tensor
-    """1 for entries of the action that have an effect: forces, and messages in the vehicle's own slot; else 0."""
+    """1 for entries of the action that have an effect: forces, and messages in the vehicle's own slot; else 0. In
+    PPO's ratio a message counts by the inverse of its noise's variance, over that of forces."""
     part: Tensor
     """Index of the row's part of the training."""
     state: Tensor
@@ -113,8 +114,8 @@ class Learner:
         """Mean actions (row, entry) and the next recurrent state, from the critic's inputs (row, entry)."""
         return self.actor.act(seen[:, : self._features], state)
 
-    def sample(self, env: Rows, noise: float) -> tuple[Rollout, float]:
-        """Samples of ``horizon`` decisions with noisy actions, and the mean reward."""
+    def sample(self, env: Rows, noise: float, message_noise: float) -> tuple[Rollout, float]:
+        """Samples of ``horizon`` decisions with noisy forces and messages, and the mean reward."""
         config, shape = self.config, (self.config.horizon, env.rows)
         observation = torch.empty((config.horizon + 1, env.rows, env.size))
         action, mean, expert_action = torch.empty((3, *shape, self._outputs))
@@ -131,6 +132,7 @@ class Learner:
             if self.imitating or self.imitation_weight:
                 expert_action[t], done = map(torch.from_numpy, env.query_expert(acts.numpy()))
                 acts = done if self.imitating else acts
+            drawn[:, 2:] *= message_noise / noise
             action[t] = acts + noise * torch.from_numpy(drawn)
             transition = env.step(action[t].numpy())
             mean_reward += float(transition.reward[transition.acted].mean()) / config.horizon
@@ -152,9 +154,11 @@ class Learner:
         arrays = observation[:-1], action, mean, expert_action, *learned, acted, used, part[:-1], first
         return Rollout(*arrays), mean_reward
 
-    def update(self, batch: Rollout, noise: float, learning_rate: float) -> tuple[float, float]:
+    def update(self, batch: Rollout, noise: float, message_noise: float, learning_rate: float) -> tuple[float, float]:
         """Train actor and critic on a batch, by PPO or by imitation of the expert; ``Record.kl`` and ``explained``."""
         self._optimiser.param_groups[0]["lr"] = learning_rate
+        if not self.imitating:
+            batch.used[..., 2:] *= (noise / message_noise) ** 2
         acted = batch.acted > 0.0
         error = (batch.advantage[acted].var() / batch.returns[acted].var().clamp(min=1e-12)).item()
         chosen = [acted & (batch.part == k) for k in range(len(self._moments[0]))]

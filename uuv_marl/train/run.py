@@ -144,13 +144,15 @@ class Trainer:
         self.learner.set_imitation(imitating, 0.0 if imitating else self.training.imitation_weight)
         if imitating:
             expert_share = (_NETWORK_ACTS - share / imitation_share) / (_NETWORK_ACTS - _EXPERT_ACTS)
-            noise, rate, share = _IMITATION_NOISE, annealed(_IMITATION_RATE, share / imitation_share), 0.0
+            noise, message_noise = _IMITATION_NOISE, 0.0  # noisy messages would mislead the expert
+            rate, share = annealed(_IMITATION_RATE, share / imitation_share), 0.0
         else:
             expert_share, share = 0.0, (share - imitation_share) / (1.0 - imitation_share)
             noise, rate = annealed(config.noise, share), annealed(config.learning_rate, share)
+            message_noise = annealed(config.message_noise, share) if config.message_noise else noise
         self.rows.schedule(annealed(config.collision_cost or (0.0, 0.0), share), expert_share)
-        batch, reward = self.learner.sample(self.rows, noise)
-        kl, explained = self.learner.update(batch, noise, rate)
+        batch, reward = self.learner.sample(self.rows, noise, message_noise)
+        kl, explained = self.learner.update(batch, noise, message_noise, rate)
         return Record(
             iteration=before.iteration + 1,
             agent_steps=before.agent_steps + int(batch.acted.sum()),

@@ -75,6 +75,8 @@ class Ppo(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=False):
     noise: tuple[PositiveFloat, PositiveFloat] = (0.5, 0.1)
     """Standard deviation of actions [1], at the start and at the end. Actions are clipped at full force, and a policy
     that learns to compensate for this overshoots without noise: end with a small value."""
+    message_noise: tuple[PositiveFloat, PositiveFloat] | None = None
+    """Standard deviation of the entries of messages [1], at the start and at the end; that of forces if None."""
     collision_cost: tuple[NonNegativeFloat, NonNegativeFloat] | None = None
     """Cost of a collision beyond the reward, at the start and at the end, see ``annealed``. If None: ``COLLISION_COST``
     with the package's tasks and rewards; 0 with a task or reward of your own."""
