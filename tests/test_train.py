@@ -117,8 +117,9 @@ def learned(problem, iterations, by, made=None):
     learner, rewards = learner_for(problem, by, made), []
     for k in range(iterations):
         share = k / iterations
-        batch, reward = learner.sample(problem, annealed((0.4, 0.1), share))
-        learner.update(batch, annealed((0.4, 0.1), share), annealed((3e-3, 5e-4), share))
+        noise = [annealed((0.4, 0.1), share)] * 2
+        batch, reward = learner.sample(problem, *noise)
+        learner.update(batch, *noise, annealed((3e-3, 5e-4), share))
         rewards.append(reward)
     return learner, rewards
 
@@ -129,8 +130,8 @@ def updated(change, memory, minibatches=10):
     problem.part = np.arange(64) % 2
     made = Architecture(hidden=(32,), memory=memory)
     learner = learner_for(problem, Ppo(horizon=8, minibatches=minibatches), made)
-    batch, _ = learner.sample(problem, 0.4)
-    learner.update(change(batch), 0.4, 1e-3)
+    batch, _ = learner.sample(problem, 0.4, 0.4)
+    learner.update(change(batch), 0.4, 0.4, 1e-3)
     return learner.arrays()
 
 
@@ -145,12 +146,29 @@ def test_a_message_that_is_not_sent_changes_no_update(memory):
         learner = Learner(
             made, [("seen", problem.features)], problem.size, problem.part, by, np.random.default_rng(0), 5
         )
-        batch, _ = learner.sample(problem, 0.4)
+        batch, _ = learner.sample(problem, 0.4, 0.1)
         action = torch.where(batch.used == spoilt, torch.full_like(batch.action, 0.7), batch.action)
-        learner.update(batch._replace(action=action), 0.4, 1e-3)
+        learner.update(batch._replace(action=action), 0.4, 0.1, 1e-3)
         arrays.append(learner.arrays())
     assert all(np.array_equal(arrays[0][name], array) for name, array in arrays[1].items())
     assert any(not np.array_equal(arrays[0][name], array) for name, array in arrays[2].items())
+
+
+def test_messages_have_a_noise_of_their_own_by_which_their_ratio_counts():
+    """The gradient of PPO's ratio at the mean is (action - mean) / variance, for forces and for messages."""
+    problem = Toy(lambda x, a: x[:, 0] * a[:, 1], 4)
+    problem.sends = np.ones(64, np.bool_)
+    learner = Learner(
+        Architecture(hidden=(32,)), [("seen", problem.features)], problem.size, problem.part, Ppo(horizon=64),
+        np.random.default_rng(0), 5,
+    )  # fmt: skip
+    batch, _ = learner.sample(problem, 0.4, 0.05)
+    drawn = (batch.action - batch.mean).std(dim=(0, 1))
+    np.testing.assert_allclose(drawn, [0.4, 0.4, 0.05, 0.05, 0.05], rtol=0.05)
+    learner.update(batch, 0.4, 0.05, 1e-3)
+    np.testing.assert_allclose(
+        batch.used[0, 0] / (2.0 * 0.4**2), [1 / (2.0 * each**2) for each in [0.4] * 2 + [0.05] * 3]
+    )
 
 
 @pytest.mark.parametrize(("memory", "since", "minibatches"), [(False, 3, 10), (True, 3, 10), (True, 0, 64)])
@@ -208,10 +226,10 @@ def test_imitation_ignores_the_reward():
     toy = Toy(lambda observation, action: 10.0 * observation[:, 0] * action[:, 0])
     learner = learner_for(toy, Ppo(horizon=8))
     learner.set_imitation(imitating=True)
-    batch, _ = learner.sample(toy, 1e-3)
+    batch, _ = learner.sample(toy, 1e-3, 1e-3)
     assert (batch.action - batch.mean).abs().max() < 0.01  # the network acts
     for _ in range(120):
-        learner.update(learner.sample(toy, 0.2)[0], 0.2, 3e-3)
+        learner.update(learner.sample(toy, 0.2, 0.2)[0], 0.2, 0.2, 3e-3)
     assert error_of(learner, (0, 0, 1.0, -1.0)) < 0.1
 
 
@@ -222,7 +240,7 @@ def test_an_imitation_weight_keeps_the_policy_near_the_expert_against_the_reward
     learner = learner_for(toy, Ppo(horizon=8))
     learner.set_imitation(imitating=False, imitation_weight=imitation_weight)
     for _ in range(150):
-        learner.update(learner.sample(toy, 0.2)[0], 0.2, 3e-3)
+        learner.update(learner.sample(toy, 0.2, 0.2)[0], 0.2, 0.2, 3e-3)
     assert error_of(learner, near) < 0.15
 
 
@@ -251,8 +269,8 @@ def test_epochs_stop_where_the_policy_has_gone_far():
     for limit in (0.01, 1e9):
         problem = Toy(lambda observation, action: action[:, 0])
         learner = learner_for(problem, Ppo(horizon=8, epochs=20, kl_stop=limit))
-        batch, _ = learner.sample(problem, 0.3)
-        divergence.append(learner.update(batch, 0.3, 3e-3)[0])
+        batch, _ = learner.sample(problem, 0.3, 0.3)
+        divergence.append(learner.update(batch, 0.3, 0.3, 3e-3)[0])
     assert 0.01 < divergence[0] < divergence[1] / 2.0
 
 
@@ -261,7 +279,7 @@ def test_a_memory_is_trained_from_where_it_was():
     problem = Toy(lambda observation, action: action[:, 0], 3)
     learner = learner_for(problem, Ppo(horizon=8), Architecture(memory=True, hidden=(8,)))
     for _ in range(2):
-        batch, _ = learner.sample(problem, 0.3)
+        batch, _ = learner.sample(problem, 0.3, 0.3)
         mean, states = learner.actor.through(batch.observation[:, :, :2], batch.state, batch.continues)
         np.testing.assert_allclose(mean.detach().reshape(8, 64, 2), batch.mean, atol=1e-6)
     np.testing.assert_allclose(states[-64:].detach(), learner.state, atol=1e-6)
@@ -294,7 +312,7 @@ def test_what_would_have_come_after_a_cut_counts_as_the_memory_would_have_seen_i
     learner.value = lambda seen, state, part: (seen[:, 2] + 10.0 * state.sum(1)).numpy()
     finals, step = [], problem.step
     problem.step = lambda action: (step(action), finals.append(problem.finals))[0]
-    batch, _ = learner.sample(problem, 0.3)
+    batch, _ = learner.sample(problem, 0.3, 0.3)
     state = torch.zeros(6, 5)
     for t in range(4):
         state = learner.act(batch.observation[t], state)[1]
@@ -509,6 +527,22 @@ def test_an_expert_records_the_executed_action_and_acts_as_it_would_alone(beside
     assert np.abs(executed[-1][1] - expected[1]).max() > 1e-3
 
 
+def test_all_messages_are_the_experts_while_it_acts_somewhere():
+    """A network's messages would mislead the expert, whose actions are the targets."""
+    overrides = {"sonar.channels": ["messages"], "modem.message_entries": 5, "modem.message_vectors": 2}
+    training = Training(scenario="few_informed", sizes=[(20, 2)], overrides=overrides, expert="leader_broadcast")
+    env = Rows(training, np.arange)
+    env.groups[0]._expert_acts[:] = True, False
+    for share in (0.5, -0.1):
+        env.schedule(0.0, share)
+        said, done = env.query_expert(np.full((env.rows, 7), 0.3, np.float32))
+        np.testing.assert_array_equal(done[:20], said[:20])
+        np.testing.assert_array_equal(done[20:, :2], np.full((20, 2), 0.3, np.float32))
+        np.testing.assert_array_equal(
+            done[20:, 2:], said[20:, 2:] if share > 0.0 else np.full((20, 5), 0.3, np.float32)
+        )
+
+
 def test_an_expert_without_its_requirements_is_named(tmp_path):
     for expert, message in (
         ("scoot", "policy 'scoot' is unknown; did you mean 'scout'"),
@@ -547,7 +581,7 @@ def test_after_the_imitation_the_network_acts_and_the_expert_is_queried():
     imitating = {"expert": "scout", "imitation_share": 0.0, "imitation_weight": 2.0}
     trainer = Trainer(Training(scenario="starter", sizes=[(4, 2)], ppo=TINY, **imitating))
     trainer.learner.set_imitation(imitating=False, imitation_weight=2.0)
-    batch, _ = trainer.learner.sample(trainer.rows, 1e-3)
+    batch, _ = trainer.learner.sample(trainer.rows, 1e-3, 1e-3)
     assert (batch.action - batch.mean).abs().max() < 0.01
     assert (batch.action - batch.expert_action).abs().mean() > 0.1
 
