@@ -28,7 +28,9 @@ def tensors(card, scale=0.3, seed=0):
 
 
 def card_for(scenario, kind="mlp", memory=False, hidden=(16, 16), **more):
-    return card_of(scenario, network=Architecture(kind=kind, memory=memory, hidden=hidden), **more)
+    """A card; networks that read moments also have a layer from the input to the output."""
+    network = Architecture(kind=kind, memory=memory, hidden=hidden, skip=kind == "moments")
+    return card_of(scenario, network=network, **more)
 
 
 def saved(folder, scenario, scale=0.3, **more):
