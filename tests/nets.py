@@ -28,9 +28,7 @@ def tensors(card, scale=0.3, seed=0):
 
 
 def card_for(scenario, kind="mlp", memory=False, hidden=(16, 16), **more):
-    """A card; networks that read moments also have a layer from the input to the output."""
-    network = Architecture(kind=kind, memory=memory, hidden=hidden, skip=kind == "moments")
-    return card_of(scenario, network=network, **more)
+    return card_of(scenario, network=Architecture(kind=kind, memory=memory, hidden=hidden), **more)
 
 
 def saved(folder, scenario, scale=0.3, **more):

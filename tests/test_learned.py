@@ -91,15 +91,6 @@ def test_moments_are_sums_over_sub_sectors_in_any_order():
     np.testing.assert_allclose(Network(made, sizes, {}, NumpyOps).features(x)[:, 23:], seen[:, 23:], atol=1e-5)
 
 
-def test_a_layer_from_input_to_output_is_added_to_the_others():
-    made, sizes = Architecture(hidden=(4,), skip=True), [("seen", 3)]
-    rng = np.random.default_rng(0)
-    t = {name: rng.standard_normal(shape).astype(np.float32) for name, shape in shapes(made, sizes, 7).items()}
-    x = rng.standard_normal((5, 3)).astype(np.float32)
-    without = Network(made.model_copy(update={"skip": False}), sizes, t, NumpyOps).output(x)
-    np.testing.assert_allclose(Network(made, sizes, t, NumpyOps).output(x) - without, x @ t["skip.weight"], atol=1e-5)
-
-
 @pytest.mark.needs("torch")
 @pytest.mark.parametrize(("kind", "memory"), KINDS)
 def test_torch_and_numpy_give_the_same(kind, memory):
