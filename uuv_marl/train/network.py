@@ -50,9 +50,9 @@ class TorchActor:
     """The policy's network with its recurrent state."""
 
     def __init__(self, architecture: Architecture, sizes: Sizes, rng: np.random.Generator, outputs: int = 2) -> None:
-        small = (f"{len(architecture.hidden)}.weight", "skip.weight")
+        last = f"{len(architecture.hidden)}.weight"
         self.tensors = {
-            name: started(shape, rng, 0.01 if name in small else 1.0 if name.startswith("gru") else math.sqrt(2.0))
+            name: started(shape, rng, 0.01 if name == last else 1.0 if name.startswith("gru") else math.sqrt(2.0))
             for name, shape in shapes(architecture, sizes, outputs).items()
         }
         if architecture.memory:  # each gate separately

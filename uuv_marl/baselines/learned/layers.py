@@ -31,8 +31,6 @@ class Architecture(pydantic.BaseModel, frozen=True, extra="forbid"):
     """Whether a recurrent layer (GRU) precedes the hidden layers, which take its state beside its input."""
     hidden: Annotated[tuple[pydantic.PositiveInt, ...], pydantic.Field(min_length=1)] = (64, 64)
     """Units of the tanh layers; the recurrent layer has as many as the last."""
-    skip: bool = False
-    """Whether a linear layer from the input is added to the output, by which a message can be passed on exactly."""
 
 
 def columns(sizes: Sizes) -> tuple[dict[str, Int64], Int64]:
@@ -61,8 +59,6 @@ def shapes(architecture: Architecture, sizes: Sizes, outputs: int = 2) -> dict[s
             tensor_shapes |= {f"{kind}.weight": (size, ENCODED), f"{kind}.place": (num, ENCODED)}
     elif architecture.kind == "moments":
         width += 2 * _POWERS * len(columns(sizes)[0])
-    if architecture.skip:
-        tensor_shapes["skip.weight"] = (width, outputs)
     if architecture.memory:
         units = architecture.hidden[-1]
         tensor_shapes |= {"gru.weight": (width, 3 * units), "gru.bias": (3 * units,)}
@@ -122,12 +118,12 @@ class Network:
         return new + update * (state - new)
 
     def output(self, z: Any, state: Any = None) -> Any:
-        """The action before its bounds, shape (row, entry), from features and the recurrent layer's state, if any."""
+        """The action before its bounds, shape (row, 2), from features and the recurrent layer's state, if any."""
         x, last = z if state is None else self._ops.joined([z, state]), len(self.architecture.hidden)
         for k in range(last + 1):
             x = self._ops.dense(x, self._tensors[f"{k}.weight"], self._tensors[f"{k}.bias"])
             x = self._ops.tanh(x) if k < last else x
-        return x + self._ops.dense(z, self._tensors["skip.weight"]) if self.architecture.skip else x
+        return x
 
 
 class NumpyOps:
