@@ -1,5 +1,6 @@
 """``SoloEnv``: one learner among vehicles that follow a policy, a plain Gymnasium environment."""
 
+from collections.abc import Mapping
 from typing import Any, Unpack
 
 import gymnasium
@@ -8,6 +9,7 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
 from uuv_marl.baselines import make_policy
+from uuv_marl.baselines.team_names import PolicyLike
 from uuv_marl.envs.changes import EnvOptions, ScenarioLike
 from uuv_marl.envs.core import StepResult, make_batched_env
 from uuv_marl.envs.drawing.options import RenderOptions
@@ -27,7 +29,8 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     state of the episode (``uuv_marl.envs.ending.ending``), so that a wrapper may end it.
 
     Args:
-        others: name of a policy, or ``module:Class``. The scenario gets its requirements
+        others: name of a policy, ``module:Class``, or a team (``uuv_marl.make_policy``) in which ``uuv_0`` acts by
+            ``step`` instead. The scenario gets its requirements
             (``uuv_marl.with_policy_requirements``), also for the learner: ``sdc`` makes observations longer.
         render_mode: ``human``, ``rgb_array`` or None.
         render_options: as for ``uuv_marl.parallel_env``; ``sonar_of`` is the learner by default.
@@ -44,14 +47,14 @@ class SoloEnv(  # pyright: ignore[reportIncompatibleVariableOverride] - spec is 
     def __init__(
         self,
         scenario: ScenarioLike = "single_obstacle",
-        others: str = "bio_inspired",
+        others: PolicyLike = "bio_inspired",
         *,
         render_mode: str | None = None,
         render_options: RenderOptions | None = None,
         info_terms: bool = False,
         **options: Unpack[EnvOptions],
     ) -> None:
-        if not isinstance(others, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+        if not isinstance(others, str | Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise TypeError(f"others must be the name of a policy, or module:Class, got {others!r}")
         if "for_policy" in options:
             raise TypeError(f"SoloEnv takes no for_policy: the scenario suits others={others!r}; leave it out")
