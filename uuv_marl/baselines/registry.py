@@ -63,7 +63,7 @@ POLICIES: dict[str, PolicyType] = {
 
 
 def policy_class(name: str) -> PolicyType:
-    """The type of a policy by its name (``uuv_marl.baselines.names``). Raises PolicyError for unknown names and teams."""
+    """The type of a policy by its name (``uuv_marl.baselines.names``). Raises PolicyError for others and for teams."""
     if team := parse_team(name):
         raise PolicyError(f"policy {name!r} is a team of {', '.join(team.members)}; name one of these")
     plain = parse_name(name).plain
