@@ -122,7 +122,7 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     """Name of a controller to whose actions the network's are added, at half the force; none if empty."""
     others: str = ""
     """Vehicles that do not learn, with the policies that they run: a team's name (``uuv_marl.make_policy``) that leaves
-    vehicles to the learner, as in ``scout@30%`` or ``scout@uuv_0``; none if empty. The learner gets no samples of them."""
+    vehicles to the learner, as in ``scout@30%`` or ``scout@uuv_0``; none if empty. They give it no samples."""
     expert: str = ""
     """Name of a policy that the network imitates before it learns from its reward; none if empty. The network gradually
     takes over the acting, with the expert's actions as targets (as in DAgger, Ross et al. 2011)."""
