@@ -42,7 +42,7 @@ CASES = {
     "crashes": ("random", lambda: short("hard_water", **CRASH)),
     "messages": ("mappo_few_informed", lambda: short("few_informed")),
     "clock": ("mappo,own_clock=true,safety_filter=true", lambda: quick("single_obstacle")),
-    "lossless": ("bio_inspired", lambda: short()),
+    "plain": ("bio_inspired", short),
 }
 
 
@@ -117,7 +117,9 @@ def test_the_batch_changes_no_byte(tmp_path, monkeypatch):
     monkeypatch.setattr("uuv_marl.data.episodes._MOST_BYTES", 1)
     alone = write_data_set(tmp_path / "c", policy, scenario, range(5))
     assert contents(whole.folder) == contents(pairs.folder) == contents(alone.folder)
-    sets = [loaded(done, tmp_path / letter, monkeypatch) for letter, done in zip("abc", (whole, pairs, alone))]
+    sets = [
+        loaded(done, tmp_path / letter, monkeypatch) for letter, done in zip("abc", (whole, pairs, alone), strict=True)
+    ]
     for episodes in zip(*sets, strict=True):
         assert len({len(episode) for episode in episodes}) == 1
         for one, other in pairwise(episodes):
@@ -206,6 +208,12 @@ def test_parquet_has_a_row_for_each_decision_and_last_observation(tmp_path):
     assert {one.shape for one in rows.observation} == {(sum(size for _, size, *_ in about["observation"]),)}
     env = gymnasium.make(EnvSpec.from_json(about["environment"]))
     assert env.observation_space.shape == rows.observation[0].shape
+
+
+def test_a_relative_folder_is_enough(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = write_data_set("data", "scout", short(), [0])
+    assert len(loaded(done, "data", monkeypatch)) == 5
 
 
 def test_the_metadata_says_what_the_data_are(tmp_path, monkeypatch):

@@ -33,7 +33,7 @@ def write_minari(folder: Path, name: str, env: SoloEnv, about: Mapping[str, Any]
         about: description of the data, for the metadata.
         worlds: Parquet files (``uuv_marl.data.parquet``), in the order of the episodes.
     """
-    partial = folder.with_name(f".{folder.name}.partial")
+    partial = folder.with_name(f".{folder.name}.partial").absolute()  # Minari fails on relative paths
     with writing(folder):
         shutil.rmtree(partial, ignore_errors=True)
         storage = MinariStorage.new(partial, env.observation_space, env.action_space, env.spec)

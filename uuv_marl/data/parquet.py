@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from uuv_marl.atomic import replacing
 from uuv_marl.data.episodes import Episode
 from uuv_marl.extras import extra
+from uuv_marl.types import Float32
 
 with extra("data", "a data set"):
     import pyarrow as pa
@@ -22,7 +24,8 @@ _ABOUT = b"uuv_marl"
 def write_world(path: Path, episodes: Sequence[Episode], period_s: float, about: Mapping[str, Any]) -> None:
     """Write a world's episodes, a row for each decision, by vehicle and time.
 
-    After an episode's decisions a row has its last observation; its action, reward, terminated and truncated are null.
+    After an episode's decisions a row has its last observation; its action is NaN (older readers can't read null
+    lists), its reward, terminated and truncated are null.
 
     Args:
         path: the file, which is replaced.
@@ -44,7 +47,7 @@ def _table(episode: Episode, period_s: float) -> Any:
         "vehicle": np.full(rows, episode.vehicle, np.int32),
         "time_s": np.arange(rows) * period_s,
         "observation": _lists(episode.observation),
-        "action": _lists(np.pad(episode.action, ((0, 1), (0, 0))), pa.array(final)),
+        "action": _lists(np.pad(episode.action, ((0, 1), (0, 0)), constant_values=np.nan)),
         "reward": pa.array(np.pad(episode.reward, (0, 1)), mask=final),
         "terminated": pa.array(last & episode.terminated, mask=final),
         "truncated": pa.array(last & episode.truncated, mask=final),
@@ -52,9 +55,9 @@ def _table(episode: Episode, period_s: float) -> Any:
     })  # fmt: skip
 
 
-def _lists(rows: Any, mask: Any = None) -> Any:
+def _lists(rows: Float32) -> Any:
     """Rows (row, entry) as a column of lists of a fixed size."""
-    return pa.FixedSizeListArray.from_arrays(rows.reshape(-1), rows.shape[1], mask=mask)
+    return pa.FixedSizeListArray.from_arrays(rows.reshape(-1), rows.shape[1])
 
 
 def described(path: Path) -> dict[str, Any]:
@@ -69,22 +72,20 @@ def num_rows(path: Path) -> int:
 
 def read_world(path: Path) -> list[Episode]:
     """The episodes of a world, by vehicle."""
-    table = parquet.read_table(path).combine_chunks()
-    columns = {name: table[name].drop_null().combine_chunks() for name in table.column_names}
-    observation, action = (columns[name].flatten().to_numpy() for name in ("observation", "action"))
-    vehicle, rewards = columns["vehicle"].to_numpy(), columns["reward"].to_numpy()
-    observation, action = observation.reshape(len(vehicle), -1), action.reshape(len(rewards), -1)
-    seed, *flags = (
-        columns[name].to_numpy(zero_copy_only=False) for name in ("seed", "terminated", "truncated", "is_success")
-    )
+    table = parquet.ParquetFile(path).read()  # parquet.read_table imports pandas
+    columns = {name: table[name].combine_chunks() for name in table.column_names}
+    lists = [columns.pop(name).flatten().to_numpy().reshape(len(table), -1) for name in ("observation", "action")]
+    column = {name: values.to_numpy(zero_copy_only=False) for name, values in columns.items()}
+    vehicle = column["vehicle"]
     ends = [*(np.flatnonzero(np.diff(vehicle)) + 1).tolist(), len(vehicle)]
     episodes: list[Episode] = []
-    for k, (begin, end) in enumerate(zip([0, *ends], ends, strict=False)):
-        own = slice(begin - k, end - k - 1)  # each earlier episode has a row without a decision
+    for begin, end in pairwise([0, *ends]):
+        decisions, last = slice(begin, end - 1), end - 2  # the row after the last decision has none
         episodes.append(
             Episode(
-                int(seed[begin]), int(vehicle[begin]), observation[begin:end], action[own], rewards[own],
-                bool(flags[0][own][-1]), bool(flags[1][own][-1]), bool(flags[2][begin]),
+                int(column["seed"][begin]), int(vehicle[begin]), lists[0][begin:end], lists[1][decisions],
+                column["reward"][decisions], bool(column["terminated"][last]), bool(column["truncated"][last]),
+                bool(column["is_success"][begin]),
             )
         )  # fmt: skip
     return episodes
