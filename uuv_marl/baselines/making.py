@@ -106,8 +106,8 @@ def make_policy(
     name = policy_name(name)
     if isinstance(target, Scenario):
         return _made(name, target, num_worlds, parameters)
-    scenario, swarm, agents = environment(target, name)
-    return EnvPolicy(_made(name, scenario, swarm.num_worlds, parameters), swarm, agents)
+    env = environment(target, name)
+    return EnvPolicy(_made(name, env.scenario, env.swarm.num_worlds, parameters), env)
 
 
 def _made(name: str, scenario: Scenario, num_worlds: int, parameters: Mapping[str, object]) -> Policy:
