@@ -16,7 +16,7 @@ from uuv_marl.sim.swarm import Swarm
 NEEDS = {
     "test_env.py": "pygame", "test_rendering.py": "pygame", "test_vector_env.py": "pygame", "test_export.py": "onnx",
     "test_film.py": "av", "test_first_tries.py": "torch", "test_train.py": "torch", "test_torchrl.py": "torchrl",
-    "test_sb3.py": "stable_baselines3",
+    "test_sb3.py": "stable_baselines3", "test_data.py": "minari",
 }  # fmt: skip
 """Files that need an extra's library throughout; a test that does says so by the mark ``needs``."""
 collect_ignore = [file for file, library in NEEDS.items() if find_spec(library) is None]

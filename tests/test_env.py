@@ -215,3 +215,26 @@ def test_the_last_info_tells_how_it_ended(reason):
     assert alone["ending"] == last["uuv_0"]["ending"]
     if reason == "time_limit":
         assert collisions > 0, "else the test shows nothing"
+
+
+def test_any_vehicle_can_be_the_learner():
+    scenario = load_scenario("starter", overrides={"losses.times_s": [4.0]})
+    env, solo = uuv_marl.parallel_env(scenario), gymnasium.make("uuv_marl/Solo-v2", scenario=scenario).unwrapped
+    policy, own = make_policy("bio_inspired", env), make_policy("bio_inspired", solo)
+    for vehicle in (3, np.int64(4), None):
+        agent, options = f"uuv_{vehicle or 0}", None if vehicle is None else {"vehicle": vehicle}
+        observations, observation = env.reset(seed=2)[0], solo.reset(seed=2, options=options)[0]
+        running = True
+        while running:
+            np.testing.assert_array_equal(observation, observations[agent])
+            actions, action = policy(observations), own(observation)
+            np.testing.assert_array_equal(action, actions[agent])
+            observations, *expected, _ = env.step(actions)
+            observation, *rest, info = solo.step(action)
+            assert rest == [each[agent] for each in expected]
+            observations = {name: observations[name] for name in {*env.agents, agent}}
+            running = agent in env.agents
+        assert info["ending"] in ("lost", "arrival")
+    for wrong, error in ((5, ValueError), (-1, ValueError), ("uuv_1", TypeError)):
+        with pytest.raises(error, match=rf"options\['vehicle'\] must be .* got {wrong!r}"):
+            solo.reset(options={"vehicle": wrong})

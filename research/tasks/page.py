@@ -53,18 +53,19 @@ def report(task: str, rows: Sequence[Row]) -> str:
 
 
 def _tiers(task: str) -> Columns:
-    """The sets of each scenario: those of the kinds of map in its file."""
-    return {
-        name: [set_name(name, kind) for kind in getattr(load_scenario(name).task_numbers, "kinds", [""])]
-        for name in (f"{task}_easy", task, f"{task}_hard")
-    }
+    return {name: tier_sets(name) for name in (f"{task}_easy", task, f"{task}_hard")}
+
+
+def tier_sets(scenario: str) -> list[str]:
+    """The sets of a scenario: those of the kinds of map in its file."""
+    return [set_name(scenario, kind) for kind in getattr(load_scenario(scenario).task_numbers, "kinds", [""])]
 
 
 def _shares(groups: Groups, study: Study, columns: Columns, share: str = "") -> str:
     """The headline, or another ``share``, with its interval, and swarm success, for policies that ran on all sets."""
     share = share or study.headline
     table = [
-        (named(policy), *(f"{_with_interval(_values(mine, share))}, {_mean(mine, 'swarm_success')}" for mine in cells))
+        (named(policy), *(f"{with_interval(_values(mine, share))}, {_mean(mine, 'swarm_success')}" for mine in cells))
         for policy in _policies(groups)
         if (cells := _cells(groups, policy, columns))
     ]
@@ -114,8 +115,8 @@ def _final(groups: Groups, study: Study) -> str:
         best = max(controllers, key=lambda controller: shares[controller].mean())
         heads += [scenario, "gain over the best controller"]
         for policy, rows in mine.items():
-            gain = _with_interval([shares[policy] - shares[best]]) if is_trained(policy) else ""
-            score_text = f"{_with_interval([shares[policy]])}, {_mean([rows], 'swarm_success')}"
+            gain = with_interval([shares[policy] - shares[best]]) if is_trained(policy) else ""
+            score_text = f"{with_interval([shares[policy]])}, {_mean([rows], 'swarm_success')}"
             table.setdefault(policy, [named(policy)]).extend((score_text, gain))
     return markdown_table(heads, table.values())
 
@@ -145,7 +146,7 @@ def _mean(mine: Sequence[Sequence[Row]], name: str) -> str:
     return short(float(np.mean([values.mean() for values in _values(mine, name)])))
 
 
-def _with_interval(sets: Sequence[Float64]) -> str:
+def with_interval(sets: Sequence[Float64]) -> str:
     """The mean over sets of values, shape (episode,) each, and its 95 % interval over episodes."""
     rng, means = np.random.default_rng(0), np.empty(_RESAMPLES)
     for k in range(_RESAMPLES):

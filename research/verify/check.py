@@ -14,6 +14,7 @@ from research.verify.rows import NoEpisodesError, Row, rows_of
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
 from uuv_marl.baselines.names import parse_name
+from uuv_marl.baselines.team_names import members_of
 from uuv_marl.benchmark.evaluate import Run, blaming, episodes
 from uuv_marl.benchmark.results import FILE
 from uuv_marl.errors import USER_ERRORS, DivergenceError, PolicyError, ResultsError
@@ -128,8 +129,8 @@ def check(row: Row, allowed: Collection[str], report: Callable[[float], None]) -
 
 
 def _check_trust(policy: str, allowed: Collection[str]) -> None:
-    plain = parse_name(policy.removeprefix(BLIND)).plain
-    if (":" in plain or is_checkpoint(plain)) and policy not in allowed:
+    plain = [parse_name(member).plain for member in members_of(policy.removeprefix(BLIND))]
+    if any(":" in name or is_checkpoint(name) for name in plain) and policy not in allowed:
         raise PolicyError(f"policy {policy!r} is not part of the package; if you trust it, give --policy {policy}")
 
 

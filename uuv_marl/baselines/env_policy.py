@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.percept import Clock, Percept
-from uuv_marl.scenario import Scenario
 from uuv_marl.sim.arguments import rounding
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float32, Int64
@@ -36,12 +35,13 @@ class EnvPolicy:
 
     Args:
         policy: made for the environment's scenario and worlds.
-        swarm: the environment's simulation.
-        agents: the environment's possible agents; empty where observations are arrays.
+        env: the environment, below all wrappers.
     """
 
-    def __init__(self, policy: Policy, swarm: Swarm, agents: Sequence[str] = ()) -> None:
-        self.policy, self._swarm = policy, swarm
+    def __init__(self, policy: Policy, env: Any) -> None:
+        self.policy, self._env = policy, env
+        self._swarm: Swarm = env.swarm
+        agents: Sequence[str] = getattr(env, "possible_agents", ())  # empty where observations are arrays
         self._index = {agent: i for i, agent in enumerate(agents)}
         self._now: tuple[bytes, ...] = ()  # time and episode of every world at the latest call
         self._before: Mapping[str, NDArray[Any]] | None = None
@@ -81,7 +81,7 @@ class EnvPolicy:
         worlds, vehicles = self._swarm.num_worlds, self._swarm.num_vehicles
         rows, entry, shape = worlds * vehicles, (self.policy.layout.size,), observations.shape
         if shape == entry and worlds == 1:
-            return self._act(np.array([0]), observations[None])[0]
+            return self._act(np.array([getattr(self._env, "learner", 0)]), observations[None])[0]
         if shape not in ((worlds, vehicles, *entry), (rows, *entry)):
             raise PolicyError(
                 "observations must have the shape that the environment gives them, for instance "
@@ -118,8 +118,8 @@ class EnvPolicy:
         return self._actions[index]
 
 
-def environment(target: HasSwarm, name: str) -> tuple[Scenario, Swarm, Sequence[str]]:
-    """Scenario, simulation and agents of an environment below all wrappers, for the policy of that name.
+def environment(target: HasSwarm, name: str) -> Any:
+    """The environment below all wrappers, with ``scenario`` and ``swarm``, for the policy of that name.
 
     Raises PolicyError if it is not an environment of this package or does not observe positions.
     """
@@ -131,4 +131,4 @@ def environment(target: HasSwarm, name: str) -> tuple[Scenario, Swarm, Sequence[
         )
     if not getattr(env, "observes_positions", True):
         raise PolicyError(f"policy {name!r} reads positions; make the environment with observe='positions'")
-    return swarm.scenario, swarm, getattr(env, "possible_agents", ())
+    return env

@@ -15,25 +15,49 @@ from uuv_marl.baselines.registry import POLICIES, PolicyType, is_trained, policy
 from uuv_marl.baselines.requirements import PolicyRequirements, inner_loop_nms, resolved_channels, with_parameters
 from uuv_marl.baselines.safety.barrier import GUARD, Barrier
 from uuv_marl.baselines.safety.guarded import Guarded
+from uuv_marl.baselines.team import Team, member_scenario, shared_scenario
+from uuv_marl.baselines.team_names import PolicyLike, TeamName, members_of, parse_team, policy_name
 from uuv_marl.errors import ScenarioError, hint
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.scenario.overrides import plain
 
 
 def policy_requirements(name: str) -> PolicyRequirements:
-    """Requirements of a policy by name and parameters."""
+    """Requirements of a policy by name and parameters; of a team all channels, and the first of each other kind."""
+    if parse_team(name):
+        return _of_team([policy_requirements(member) for member in members_of(name)])
     given = parse_name(name).parameters
     return with_parameters(policy_class(name).requirements, [key for key in given if _value(given[key]) is True])
 
 
-def with_policy_requirements(name: str, scenario: Scenario) -> Scenario:
+def _of_team(each: Sequence[PolicyRequirements]) -> PolicyRequirements:
+    """Requirements of a team from those of its members."""
+    sender = next((required for required in each if required.message_entries), each[0])
+    return each[0]._replace(
+        channels=[*dict.fromkeys(channel for required in each for channel in required.channels)],
+        decision_period_s=next((period for required in each if (period := required.decision_period_s)), None),
+        message_entries=sender.message_entries, message_vectors=sender.message_vectors, outputs_force=False,
+    )  # fmt: skip
+
+
+def with_policy_requirements(name: PolicyLike, scenario: Scenario) -> Scenario:
     """The scenario with exactly the channels, messages, yaw damping and decision period that a policy requires.
 
     With ``timing.fixed``, the scenario's damping and period stay, unless the name has ``own_clock=true``. If the
     scenario has ``modem``, it replaces the channel ``link``, except for policies that require both and for trained
     policies, which use the channels of their training.
+
+    A team's scenario has the channels and messages of all members. Members without a decision period have that of the
+    others. Raises PolicyError if members require different periods, dampings or messages.
     """
-    return with_requirements(name, policy_requirements(name), scenario)
+    name = policy_name(name)
+    required = {member: policy_requirements(member) for member in members_of(name)}
+    if name in required:
+        return with_requirements(name, required[name], scenario)
+    period = _of_team([*required.values()]).decision_period_s
+    if period and not scenario.timing.fixed:
+        scenario = load_scenario(scenario, overrides={"timing.decision_period_s": period})
+    return shared_scenario(name, {member: with_requirements(member, required[member], scenario) for member in required})
 
 
 def with_requirements(name: str, required: PolicyRequirements, scenario: Scenario) -> Scenario:
@@ -57,18 +81,19 @@ def with_requirements(name: str, required: PolicyRequirements, scenario: Scenari
 
 
 @overload
-def make_policy(name: str, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
+def make_policy(name: PolicyLike, target: Scenario, num_worlds: int = 1, **parameters: object) -> Policy: ...
 @overload
-def make_policy(name: str, target: HasSwarm, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
+def make_policy(name: PolicyLike, target: HasSwarm, num_worlds: int = 1, **parameters: object) -> EnvPolicy: ...
 def make_policy(
-    name: str, target: Scenario | HasSwarm, num_worlds: int = 1, **parameters: object
+    name: PolicyLike, target: Scenario | HasSwarm, num_worlds: int = 1, **parameters: object
 ) -> Policy | EnvPolicy:
     """Make a policy by name.
 
     Args:
         name: one of ``POLICIES``, the path of a checkpoint (``runs/starter/best``), or ``module:Class``; parameters and
             gains may follow, as in ``bio_inspired,zeta_n=0.5,obstacle_term=per_obstacle``; ``safety_filter=true``
-            adds the safety filter.
+            adds the safety filter. Or a team, as in ``scout@uuv_0+mappo``, ``{"uuv_0": "scout", "*": "mappo"}``, or
+            ``scout@30%+mappo`` for shares of the vehicles, drawn by the seed of the episode.
         target: a scenario, for a policy that maps ``Percept`` to actions (``Policy``); or an environment of this
             package, wrapped or not, for a policy that maps its observations to its actions (``EnvPolicy``).
         num_worlds: number of parallel worlds; an environment has its own.
@@ -78,16 +103,21 @@ def make_policy(
         PolicyError: the name or a parameter is unknown, or the target lacks what the policy requires
             (``with_policy_requirements``).
     """
-    if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise PolicyError(f"a policy is given by its name, such as 'scout' or 'module:Class', got {name!r}")
+    name = policy_name(name)
     if isinstance(target, Scenario):
         return _made(name, target, num_worlds, parameters)
-    scenario, swarm, agents = environment(target, name)
-    return EnvPolicy(_made(name, scenario, swarm.num_worlds, parameters), swarm, agents)
+    env = environment(target, name)
+    return EnvPolicy(_made(name, env.scenario, env.swarm.num_worlds, parameters), env)
 
 
 def _made(name: str, scenario: Scenario, num_worlds: int, parameters: Mapping[str, object]) -> Policy:
-    """The policy of a type with these parameters, its card's base controller, and the safety filter if named."""
+    """A team, or a policy with these parameters, its card's base controller, and the safety filter if named."""
+    if team := parse_team(name):
+        if parameters:
+            raise PolicyError(
+                f"team {name!r}: write {min(parameters)} into the name of a member, as in scout,preset=plus"
+            )
+        return make_team(team, scenario, num_worlds)
     parsed, policy_type = parse_name(name), policy_class(name)
     values = {**parsed.parameters, **parameters}
     barrier = values.pop("barrier", GUARD) if parsed.safety_filter else GUARD
@@ -101,6 +131,15 @@ def _made(name: str, scenario: Scenario, num_worlds: int, parameters: Mapping[st
         policy = compose(policy, policy_type.checkpoint.card)
     policy.name = name
     return Guarded(scenario, num_worlds, inner=policy, barrier=barrier) if parsed.safety_filter else policy
+
+
+def make_team(team: TeamName, scenario: Scenario, num_worlds: int, given: Mapping[str, Policy] = {}) -> Team:
+    """A team; ``given`` are members that are not made from their names, for ``member_scenario``."""
+    members = [
+        given.get(member) or _made(member, member_scenario(policy_requirements(member), scenario), num_worlds, {})
+        for member in team.members
+    ]
+    return Team(scenario, num_worlds, team=team, members=members)
 
 
 def compose(network: Policy, card: Card) -> Policy:
@@ -127,7 +166,7 @@ def check_base_controller(name: str) -> None:
     Nor may it have a safety filter of its own, which the network's part of an action would bypass.
     """
     plain = name.partition(",")[0]
-    if isinstance(POLICIES.get(plain), Trained) or ":" in plain or is_checkpoint(plain):
+    if isinstance(POLICIES.get(plain), Trained) or ":" in plain or "@" in name or is_checkpoint(plain):
         controllers = ", ".join(known for known, type_ in POLICIES.items() if not isinstance(type_, Trained))
         raise PolicyError(f"base_controller must be one of {controllers}, got {name!r}")
     if parse_name(name).safety_filter:

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from uuv_marl.baselines.team_names import members_of
 from uuv_marl.errors import PolicyError
 from uuv_marl.paths import user_path
 
@@ -12,7 +13,7 @@ class PolicyName(NamedTuple):
     """Parts of a policy's name."""
 
     plain: str
-    """One of ``POLICIES``, the path of a checkpoint, or ``module:Class``."""
+    """One of ``POLICIES``, the path of a checkpoint, or ``module:Class``; the whole name of a team."""
     parameters: dict[str, str]
     """Values by parameter or gain, as text."""
     safety_filter: bool
@@ -25,8 +26,12 @@ class PolicyName(NamedTuple):
 def parse_name(name: str) -> PolicyName:
     """Parts of a name such as ``bio_inspired,zeta_n=0.5,safety_filter=true``.
 
+    A team (``uuv_marl.baselines.team_names``) has its own clock if all members have theirs; the parameters are theirs.
+
     Raises PolicyError if a part is not ``key=value`` or an option is neither true nor false.
     """
+    if (members := members_of(name)) != (name,):
+        return PolicyName(name, {}, False, all(parse_name(member).own_clock for member in members))
     plain, *pairs = [name] if user_path(name).exists() else name.split(",")
     if (wrong := next((pair for pair in pairs if not all(pair.partition("="))), None)) is not None:
         raise PolicyError(f"policy {name!r}: {wrong!r} must be key=value, such as bio_inspired,zeta_n=0.5")

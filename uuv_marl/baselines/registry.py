@@ -20,6 +20,7 @@ from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.policy import Policy, PolicyError
 from uuv_marl.baselines.scout import carrot, seeker
 from uuv_marl.baselines.scout.controller import Scout
+from uuv_marl.baselines.team_names import parse_team
 from uuv_marl.errors import hint
 from uuv_marl.modules import named_object
 
@@ -62,7 +63,9 @@ POLICIES: dict[str, PolicyType] = {
 
 
 def policy_class(name: str) -> PolicyType:
-    """The type of a policy by its name (``uuv_marl.baselines.names``). Raises PolicyError if the name is unknown."""
+    """The type of a policy by its name (``uuv_marl.baselines.names``). Raises PolicyError for others and for teams."""
+    if team := parse_team(name):
+        raise PolicyError(f"policy {name!r} is a team of {', '.join(team.members)}; name one of these")
     plain = parse_name(name).plain
     if plain not in POLICIES and is_checkpoint(plain):
         trained = Trained(plain, plain)
@@ -86,5 +89,7 @@ def policy_class(name: str) -> PolicyType:
 
 def is_trained(name: str) -> bool:
     """Whether a name is a trained policy's: one that ships, or the path of a checkpoint, which need not exist."""
+    if parse_team(name):
+        return False
     plain = parse_name(name).plain
     return isinstance(POLICIES[plain], Trained) if plain in POLICIES else not re.fullmatch(r"[\w.]+:\w+", plain)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 
 from uuv_marl.baselines import POLICIES, make_policy
+from uuv_marl.baselines.team_names import PolicyLike, policy_name
 from uuv_marl.benchmark.metrics import Metrics, MetricsRecorder
 from uuv_marl.envs.changes import Changes, ScenarioLike, changed
 from uuv_marl.errors import USER_ERRORS, DivergenceError, PolicyError
@@ -89,7 +90,7 @@ def episodes(
 
 
 def evaluate(
-    policy: str,
+    policy: PolicyLike,
     scenario: ScenarioLike = "single_obstacle",
     seeds: Iterable[int] = range(20),
     **changes: Unpack[Changes],
@@ -97,7 +98,7 @@ def evaluate(
     """Run a policy on a scenario with the policy's requirements; the metrics of every episode.
 
     Args:
-        policy: a name, the path of a checkpoint or ``module:Class``, see ``uuv_marl.make_policy``.
+        policy: a name, the path of a checkpoint, ``module:Class`` or a team, see ``uuv_marl.make_policy``.
         scenario: a name, a TOML file or a ``Scenario``.
         seeds: one seed for each episode.
         changes: ``num_vehicles``, ``decision_period``, ``task`` and ``overrides``, as for ``uuv_marl.parallel_env``.
@@ -110,8 +111,9 @@ def evaluate(
         DivergenceError: the integration step is too long for a vehicle.
     """
     given = [whole_number("seed", seed, 0) for seed in seeds]
-    with blaming(policy):
-        runs = [*episodes(changed(scenario, policy, **changes), policy, given)]
+    name = policy_name(policy)
+    with blaming(name):
+        runs = [*episodes(changed(scenario, name, **changes), name, given)]
     return [{"seed": run.seed, **run.metrics} for run in sorted(runs, key=lambda run: given.index(run.seed))]
 
 

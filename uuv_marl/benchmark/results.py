@@ -22,8 +22,9 @@ from uuv_marl import __version__
 from uuv_marl.atomic import replacing, write_text, writing
 from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.making import policy_requirements
-from uuv_marl.baselines.registry import policy_class
+from uuv_marl.baselines.registry import PolicyType, policy_class
 from uuv_marl.baselines.requirements import FULL_TORQUE_NM, PolicyRequirements
+from uuv_marl.baselines.team_names import members_of
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
@@ -246,18 +247,24 @@ def load_trace(path: UserPath) -> Trace:
 
 
 def policy_info(policy: str) -> PolicyInfo:
-    """Requirements of a policy as tables and results show them, and a hash of its file, if it is a user's."""
-    policy_type, required = policy_class(policy), policy_requirements(policy)
+    """Requirements of a policy as tables and results show them, and a hash of its file or of those of a team."""
+    required, types = policy_requirements(policy), {member: policy_class(member) for member in members_of(policy)}
     damping = required.yaw_damping_nms * (FULL_TORQUE_NM / required.full_torque_nm)
     known = PolicyInfo(channels=list(required.channels), yaw_damping_nms=damping, source=None)
     if required.decision_period_s:
         known["decision_period_s"] = required.decision_period_s
-    if isinstance(policy_type, Trained):
-        known["source"] = policy_type.checkpoint.digest
+    sources = [_source(member, policy_type) for member, policy_type in types.items()]
+    known["source"] = sources[0] if len(sources) == 1 or not any(sources) else _hash(repr(sources).encode())
+    if isinstance(policy_type := types.get(policy), Trained):
         known["policy_class"] = policy_type.checkpoint.card.policy_class
-    elif ":" in policy:
-        known["source"] = _file_hash(policy_type)
     return known
+
+
+def _source(policy: str, policy_type: PolicyType) -> str | None:
+    """Hash of a policy's checkpoint or file; None for a controller of the package."""
+    if isinstance(policy_type, Trained):
+        return policy_type.checkpoint.digest
+    return _file_hash(policy_type) if ":" in policy else None
 
 
 def requirements_of(known: PolicyInfo) -> PolicyRequirements:

@@ -33,7 +33,9 @@ errors = Console(stderr=True)
 Restart = Annotated[
     bool, typer.Option("--restart", help="Drop the runs of policies whose file has changed, and run these again.")
 ]
-MANY_POLICIES = "Name, checkpoint (runs/mine/best) or module:Class. Repeat it for several. Default: {}"
+MANY_POLICIES = (
+    "Name, checkpoint (runs/mine/best), module:Class or team (scout@30%+mappo). Repeat it for several. Default: {}"
+)
 
 
 def overrides_option(examples: str) -> Any:

@@ -27,7 +27,7 @@ class Changes(TypedDict, total=False):
 class EnvOptions(Changes, total=False):
     """Arguments of every environment API beyond the scenario, explained by ``uuv_marl.parallel_env``."""
 
-    for_policy: str | None
+    for_policy: str | Mapping[str, str] | None
     max_cycles: int | None
     reward: Reward
     observe: Observe
@@ -39,12 +39,14 @@ _FIELDS = {"num_vehicles": "swarm.num_vehicles", "decision_period": _PERIOD, "ta
 """Fields that arguments stand for."""
 
 
-def changed(scenario: ScenarioLike, for_policy: str | None = None, **changes: Unpack[Changes]) -> Scenario:
+def changed(
+    scenario: ScenarioLike, for_policy: str | Mapping[str, str] | None = None, **changes: Unpack[Changes]
+) -> Scenario:
     """The scenario, changed by the arguments of an environment.
 
     Args:
         scenario: a name, a TOML file or a ``Scenario``.
-        for_policy: a policy; the scenario gets its requirements after the other changes.
+        for_policy: a policy or a team; the scenario gets its requirements after the other changes.
         changes: ``num_vehicles`` replaces the scenario's number of vehicles, ``decision_period`` the time between
             decisions [s], ``task`` the task (``mine:Rendezvous``), and ``overrides`` any field, as in
             ``{"sonar.echo_reports": "surface"}``.
@@ -69,7 +71,9 @@ def changed(scenario: ScenarioLike, for_policy: str | None = None, **changes: Un
     return asked if for_policy is None else _with_requirements(for_policy, load_scenario(scenario), asked, given)
 
 
-def _with_requirements(policy: str, base: Scenario, asked: Scenario, given: Mapping[str, object]) -> Scenario:
+def _with_requirements(
+    policy: str | Mapping[str, str], base: Scenario, asked: Scenario, given: Mapping[str, object]
+) -> Scenario:
     """The scenario ``asked`` for with what the policy requires.
 
     Raises:

@@ -194,7 +194,7 @@ def make_batched_env(
     reward: Reward = "dense",
     observe: Observe = "positions",
     keep_terms: bool = True,
-    for_policy: str | None = None,
+    for_policy: str | Mapping[str, str] | None = None,
     **changes: Unpack[Changes],
 ) -> BatchedEnv:
     """Worlds from the arguments that every environment API takes: those of ``BatchedEnv`` and ``changed``.

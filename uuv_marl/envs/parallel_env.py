@@ -178,7 +178,7 @@ def parallel_env(
     task: str | Mapping[str, object] | None = None,
     decision_period: float | None = None,
     overrides: Mapping[str, object] | None = None,
-    for_policy: str | None = None,
+    for_policy: str | Mapping[str, str] | None = None,
 ) -> SwarmParallelEnv:
     """A PettingZoo parallel environment.
 
@@ -201,7 +201,7 @@ def parallel_env(
         decision_period: time between decisions [s], a multiple of the control step; replaces
             ``timing.decision_period_s``. Between decisions the force keeps its direction in the world frame.
         overrides: any field of the scenario, such as ``{"sonar.echo_reports": "surface"}``.
-        for_policy: name of a policy; the scenario gets its channels, yaw damping and decision period after all other
+        for_policy: a policy or a team; the scenario gets its channels, yaw damping and decision period after all other
             changes (``uuv_marl.with_policy_requirements``).
     """
     batch = make_batched_env(

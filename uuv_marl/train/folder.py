@@ -17,7 +17,7 @@ from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.errors import PolicyError, ResultsError, ScenarioError, TrainingError
 from uuv_marl.scenario.overrides import leaves
-from uuv_marl.train.training import Training
+from uuv_marl.train.training import LEARNER, Training
 
 _CHECKPOINT_NAME = re.compile(r"\d{6,}(\.partial)?")
 """Names of checkpoints; everything else under ``checkpoints`` is the user's."""
@@ -212,11 +212,13 @@ def opened(path: Path, training: Training | None, say: Say) -> Iterator[Training
 
 
 def _inputs(training: Training) -> dict[str, Any]:
-    """Inputs of a training beyond its description, by name: its scenarios, and the digest of an expert's file."""
+    """Inputs of a training beyond its description, by name: its scenarios, and digests of checkpoints that it uses."""
     contents: dict[str, Any] = {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
-    policy_type = policy_class(training.expert) if training.expert else None
-    if isinstance(policy_type, Trained):
-        contents[training.expert] = {"expert": f"{training.expert} ({policy_type.checkpoint.digest})"}
+    others = training.team(LEARNER).members[:-1] if training.others else ()
+    for role, name in [("expert", training.expert), *(("others", member) for member in others)]:
+        policy_type = policy_class(name) if name else None
+        if isinstance(policy_type, Trained):
+            contents[name] = {role: f"{name} ({policy_type.checkpoint.digest})"}
     return contents
 
 

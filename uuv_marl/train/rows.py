@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 
 from uuv_marl.baselines.learned.actor import bound, in_disc
 from uuv_marl.baselines.learned.checkpoint import Card
-from uuv_marl.baselines.making import compose, make_policy
+from uuv_marl.baselines.making import compose, make_policy, make_team
 from uuv_marl.baselines.policy import Policy, part_of, parts_of
+from uuv_marl.baselines.team import Team, columns, narrowed
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
+from uuv_marl.sim.observation import observation_layout
 from uuv_marl.train.critic import PRIVILEGED_SIZE, privileged
-from uuv_marl.train.training import Part, Training
+from uuv_marl.train.training import LEARNER, Part, Training
 from uuv_marl.types import Bool, Float32
 
 TRAINING_SEEDS = (100_000, 900_000)
@@ -34,7 +36,7 @@ class Transition(NamedTuple):
     truncated: Bool
     """Whether the episode was cut off."""
     acted: Bool
-    """Whether the vehicle acted: it was not lost before."""
+    """Whether the vehicle acted by the learner: it was not lost before, and runs no policy of ``Training.others``."""
     final: Float32
     """Final inputs of the critic in the truncated rows, shape (truncated row, entry)."""
 
@@ -53,14 +55,19 @@ class ExternalActionPolicy(Policy):
 
 
 class Group:
-    """Worlds of one scenario and swarm size, with the base controller, filter and expert of the training."""
+    """Worlds of one scenario and swarm size, with the base controller, filter, expert and others of the training."""
 
     def __init__(self, training: Training, part: Part) -> None:
         scenario, card = part.scenario, training.card
         reward = training.reward_for(scenario)
-        self.env = BatchedEnv(scenario, part.worlds, reward, observe="closeness", keep_terms=False)
+        swarm_scenario = training.swarm_scenario(part)
+        self.env = BatchedEnv(swarm_scenario, part.worlds, reward, observe="closeness", keep_terms=False)
+        own = observation_layout(scenario, "closeness")
+        self._columns = columns(self.env.layout, own) if training.others else slice(None)
         self._network_action = ExternalActionPolicy(scenario, part.worlds, card)
         self._acting = compose(self._network_action, card)
+        if training.others:
+            self._acting = make_team(training.team(LEARNER), swarm_scenario, part.worlds, {LEARNER: self._acting})
         self._shape, self._state = (part.worlds, part.vehicles), training.critic == "pooled"
         self.collision_cost = 0.0
         """Cost of a collision beyond the reward."""
@@ -71,6 +78,7 @@ class Group:
 
     def seen(self, observation: Float32) -> Float32:
         """Inputs of the critic (row, entry), from observations (world, vehicle, entry)."""
+        observation = observation[:, :, self._columns]
         parts = [observation, privileged(self.env.swarm)] if self._state else [observation]
         return np.concatenate(parts, axis=2).reshape(self._shape[0] * self._shape[1], -1)
 
@@ -84,13 +92,16 @@ class Group:
 
     def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
         """The expert's actions, and those to execute, in its own worlds the expert's; shape (row, entry)."""
-        expert_action = cast(Policy, self._expert).act(self.env.swarm.percept).reshape(action.shape).copy()
+        expert = cast(Policy, self._expert)
+        expert_action = expert.act(narrowed(self.env.swarm.percept, expert.layout)).reshape(action.shape).copy()
         return expert_action, np.where(np.repeat(self._expert_acts, self._shape[1])[:, None], expert_action, action)
 
     def step(self, action: Float32, seeds: Seeds) -> tuple[Transition, Float32]:
         """The transition of the group's rows, and the critic's inputs."""
         env, n = self.env, self._shape[1]
-        acted = env.swarm.state.alive.reshape(-1).copy()
+        acted = env.swarm.state.alive.copy()
+        if isinstance(self._acting, Team):
+            acted &= self._acting.running(LEARNER, env.swarm.percept.clock)
         action = action.copy()
         bound(action, in_disc(self._network_action))
         action = action.reshape(*self._shape, -1)
@@ -108,7 +119,7 @@ class Group:
         final = self.seen(observation)[cut] if cut.any() else np.zeros((0, len(self.seen(observation)[0])), np.float32)
         if len(over):
             observation = self.start([int(seed) for seed in seeds(len(over))], over.tolist())
-        return Transition(reward.astype(np.float32), done, cut, acted, final), self.seen(observation)
+        return Transition(reward.astype(np.float32), done, cut, acted.reshape(-1), final), self.seen(observation)
 
     def snapshot(self) -> dict[str, NDArray[Any]]:
         """The state for ``restore``, without observations."""
@@ -143,7 +154,7 @@ class Rows:
         self.part = np.repeat(np.arange(len(self._rows)), np.diff(ends))
         """Index of the part of the training to which each row belongs, shape (row,)."""
         self.rows: int = ends[-1]
-        self.features = self.groups[0].env.layout.size
+        self.features = sum(size for _, size in training.card.sizes)
         self.size = self.features + PRIVILEGED_SIZE * (training.critic == "pooled")
         self.observation = np.zeros((self.rows, self.size), np.float32)
         for group, rows in zip(self.groups, self._rows, strict=True):

@@ -96,7 +96,8 @@ def _run(folder: TrainingFolder, until: float, say: Say, stop: Stop) -> Iterator
         f"{part.vehicles} vehicles ({part.name}, {part.worlds} worlds, {conditions(part.scenario)})"
         for part in training.parts
     ]
-    say(f"{training.card.policy_class}: swarms of {'; '.join(parts)}.")
+    others = f"; {training.others} does not learn" if training.others else ""
+    say(f"{training.card.policy_class}: swarms of {'; '.join(parts)}{others}.")
     say(objective(training))
     with fixed_torch():
         trainer = Trainer(training, folder.checkpoint)

@@ -12,6 +12,8 @@ from uuv_marl.baselines.learned.checkpoint import Card, card_of
 from uuv_marl.baselines.learned.layers import Architecture
 from uuv_marl.baselines.making import check_base_controller
 from uuv_marl.baselines.requirements import FULL_TORQUE_NM, inner_loop_nms
+from uuv_marl.baselines.team import shared_scenario
+from uuv_marl.baselines.team_names import TeamName, parse_team
 from uuv_marl.envs.changes import Reward
 from uuv_marl.errors import PolicyError, RewardError, ScenarioError, TrainingError
 from uuv_marl.modules import named_object
@@ -25,6 +27,8 @@ _PERIOD, _LOOP, _LOOP_NMS = "timing.decision_period_s", "actuators.yaw_damping_n
 OVERRIDES: Mapping[str, object] = {_PERIOD: 0.5, _LOOP: _LOOP_NMS}
 """Changes to a scenario without ``timing.fixed``, for the paper's vehicle: a fifth of the decisions, and a yaw damping,
 so that action noise does not spin the vehicle."""
+LEARNER = "<learner>"
+"""Name of the learner in a team with ``Training.others``."""
 COLLISION_COST = (1.0, 300.0)
 """Cost of a collision beyond the rewards of the package's tasks: small at first, so that vehicles learn to move."""
 ROWS = 640
@@ -118,6 +122,9 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     """Whether actions pass the safety filter, in training and in use."""
     base_controller: str = ""
     """Name of a controller to whose actions the network's are added, at half the force; none if empty."""
+    others: str = ""
+    """Vehicles that do not learn, with the policies that they run: a team's name (``uuv_marl.make_policy``) that leaves
+    vehicles to the learner, as in ``scout@30%`` or ``scout@uuv_0``; none if empty. They give it no samples."""
     expert: str = ""
     """Name of a policy that the network imitates before it learns from its reward; none if empty. The network gradually
     takes over the acting, with the expert's actions as targets (as in DAgger, Ross et al. 2011)."""
@@ -173,6 +180,8 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
                 f"reward must be one of {', '.join(known)}, the rewards of task {tasks}, or module:function, "
                 f"got {self.reward!r}"
             )
+        for part in self.parts if self.others else ():
+            self.swarm_scenario(part)
         for name, scenario in self._scenarios.items():
             card = self._card(scenario)
             if differs := next((f for f in Card.model_fields if getattr(card, f) != getattr(self.card, f)), None):
@@ -215,6 +224,33 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
             for n, worlds in sizes:
                 parts.append(Part(name, load_scenario(scenario, num_vehicles=n), worlds or max(1, round(share / n))))
         return tuple(parts)
+
+    def team(self, learner: str) -> TeamName:
+        """The team of a policy, by its name, and ``others``. Raises TrainingError where these leave it no vehicle."""
+        team = parse_team(f"{self.others}+{learner}")
+        if team is None or team.members[-1] != learner or team.rest != len(team.members) - 1:
+            raise TrainingError(
+                f"others = {self.others!r} must name vehicles for each policy, and leave some to the learner, as in "
+                "scout@30% or scout@uuv_0"
+            )
+        return team
+
+    def swarm_scenario(self, part: Part) -> Scenario:
+        """The scenario of a part, also with what ``others`` require, of which the learner observes nothing.
+
+        Raises:
+            TrainingError: ``others`` leave no vehicle to the learner.
+            PolicyError: they do not exist, or require another clock than the training's.
+        """
+        if not self.others:
+            return part.scenario
+        team = self.team(LEARNER)
+        if (team.assigned(part.vehicles, 0) != team.rest).all():
+            raise TrainingError(
+                f"others = {self.others!r} leave none of {part.vehicles} vehicles to the learner; name fewer"
+            )
+        suited = {member: with_policy_requirements(member, part.scenario) for member in team.members[:-1]}
+        return shared_scenario(self.others, {LEARNER: part.scenario, **suited})
 
     @cached_property
     def card(self) -> Card:

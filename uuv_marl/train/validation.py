@@ -47,7 +47,8 @@ class Validation(NamedTuple):
 
 
 def validate(policy: str, training: Training) -> Validation:
-    """Run a policy, by its name or path, on the validation seeds with each scenario and size of a training."""
+    """Run a policy, by its name or path, with the training's ``others`` on the validation seeds of each part."""
+    policy = training.team(policy).name if training.others else policy
     number = max(1, training.validation_episodes // len(training.parts))
     seeds = range(VALIDATION_SEEDS, VALIDATION_SEEDS + number)
     runs = [(part, run) for part in training.parts
@@ -92,4 +93,5 @@ def replay_command(policy: Path, training: Training, worst: Worst) -> str:
     if n == load_scenario(name).swarm.num_vehicles:
         del changes["swarm.num_vehicles"]
     sets = [f"{field}={json.dumps(value)}" for field, value in changes.items() if field not in _EVERY_POLICYS_OWN]
-    return command(name, str(policy), seed, sets)
+    swarm = training.team(str(policy)).name if training.others else str(policy)
+    return command(name, swarm, seed, sets)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib import resources
 from typing import Any, NamedTuple
 
-from uuv_marl.baselines.registry import policy_class
+from uuv_marl.baselines.making import policy_requirements
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
 
@@ -44,7 +44,7 @@ class Axis(NamedTuple):
 
     def concerns(self, policy: str) -> bool:
         """Whether the policy uses the disturbed channels."""
-        return not self.channels or not self.channels.isdisjoint(policy_class(policy).requirements.channels)
+        return not self.channels or not self.channels.isdisjoint(policy_requirements(policy).channels)
 
 
 def _axis(name: str, data: dict[str, Any]) -> Axis:
