@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from research.second import runnable
 from uuv_marl.baselines import Policy, make_policy
 from uuv_marl.baselines.requirements import PolicyRequirements
 from uuv_marl.percept import Percept
@@ -25,7 +26,7 @@ class Shuffled(Policy):
 
     def __init__(self, scenario: Scenario, num_worlds: int = 1, *, inner: str) -> None:
         super().__init__(scenario, num_worlds)
-        self._inner = make_policy(inner, scenario, num_worlds)
+        self._inner = make_policy(runnable(inner), scenario, num_worlds)
 
     def reset(self, seed: SeedLike = 0, worlds: Sequence[int] | None = None) -> None:
         """Reset also the inner policy."""

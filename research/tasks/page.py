@@ -103,22 +103,30 @@ def _size(row: Row) -> int:
 
 
 def _final(groups: Groups, study: Study) -> str:
-    """The headline and the swarm success on the final seeds, and a network's gain over the best controller there."""
+    """The headline and the swarm success on the final seeds.
+
+    Networks and policies that send messages have their gain over the best controller without messages there.
+    """
     heads, table = ["policy"], dict[str, list[str]]()
     for scenario, name in study.final.items():
         mine = {policy: rows for (policy, where), rows in groups.items() if where == name}
         shares = {policy: np.array(measured(rows, study.headline)) for policy, rows in mine.items()}
         controllers = [
             policy for policy in mine
-            if not (is_trained(policy) or policy.startswith(_NOT_CONTROLLERS) or "_informed" in policy)
+            if not (is_trained(policy) or policy.startswith(_NOT_CONTROLLERS) or "_informed" in policy or _talks(policy))
         ]  # fmt: skip
         best = max(controllers, key=lambda controller: shares[controller].mean())
         heads += [scenario, "gain over the best controller"]
         for policy, rows in mine.items():
-            gain = with_interval([shares[policy] - shares[best]]) if is_trained(policy) else ""
+            gain = with_interval([shares[policy] - shares[best]]) if is_trained(policy) or _talks(policy) else ""
             score_text = f"{with_interval([shares[policy]])}, {_mean([rows], 'swarm_success')}"
             table.setdefault(policy, [named(policy)]).extend((score_text, gain))
     return markdown_table(heads, table.values())
+
+
+def _talks(policy: str) -> bool:
+    """Whether a policy sends messages."""
+    return policy_requirements(runnable(policy)).message_entries > 0
 
 
 def named(policy: str) -> str:

@@ -9,9 +9,8 @@ from research.sets import EpisodeSet
 _DATA: dict[str, Any] = read_toml("tasks", "studies.toml")
 SEEDS: int = _DATA["seeds"]
 """Episodes of each policy on each set, from seed 0 on."""
-FINAL = range(*_DATA["final"])
-"""Seeds of the final sets; a policy runs on them only after its weights are frozen."""
 _FINAL = "final"
+"""Seeds of a final set, and the end of its name; a policy runs on them only after its weights are frozen."""
 SIZE, INFORMED = "swarm.num_vehicles", "task.informed"
 
 
@@ -49,9 +48,9 @@ def _study(task: str, table: dict[str, Any]) -> Study:
     policies: dict[str, dict[str, range]] = {}
     for run in table["runs"]:
         own = {field: run[key] for field, key in ((SIZE, "num_vehicles"), (INFORMED, "informed")) if key in run}
-        seeds = FINAL if run.get(_FINAL) else range(SEEDS)
+        seeds = range(*run.get(_FINAL, (SEEDS,)))
         for scenario in run["scenarios"]:
-            for kind in run.get("kinds", [_FINAL if run.get(_FINAL) else ""]):
+            for kind in run.get("kinds", [_FINAL if _FINAL in run else ""]):
                 name = set_name(scenario, kind, *own.values())
                 changes[name] = scenario, ({"task.kinds": [kind], **own} if "kinds" in run else own)
                 policies.setdefault(name, {}).update(dict.fromkeys(_DATA["policies"][run["policies"]], seeds))

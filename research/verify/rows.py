@@ -14,6 +14,7 @@ from research.episodes import read_text
 from research.heldout import sets as heldout
 from research.learners import cells as learners
 from research.learners.protocol import LEARNERS, TASKS
+from research.messages import sets as messages
 from research.paper import report as paper
 from research.second import runnable
 from research.sets import DIGITS
@@ -127,7 +128,9 @@ def _of(case: Case) -> Source:
 
 
 def _set(cells: Cells) -> Source:
-    episode_set = next((each for each in (*heldout.SETS, *studies.SETS) if each.name == cells["set"]), None)
+    episode_set = next(
+        (each for each in (*heldout.SETS, *studies.SETS, *messages.SETS) if each.name == cells["set"]), None
+    )
     if episode_set is None:
         raise ResultsError(f"there is no set {cells['set']!r} in this version")
     return _of(Case(episode_set.name, episode_set.scenario, runnable(cells["policy"]), episode_set.overrides))
