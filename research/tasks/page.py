@@ -113,7 +113,8 @@ def _final(groups: Groups, study: Study) -> str:
         shares = {policy: np.array(measured(rows, study.headline)) for policy, rows in mine.items()}
         controllers = [
             policy for policy in mine
-            if not (is_trained(policy) or _talks(policy) or policy.startswith(_NOT_CONTROLLERS) or "_informed" in policy)
+            if not (is_trained(policy) or _talks(policy))
+            and not (policy.startswith(_NOT_CONTROLLERS) or "_informed" in policy)
         ]  # fmt: skip
         best = max(controllers, key=lambda controller: shares[controller].mean())
         heads += [scenario, "gain over the best controller"]
