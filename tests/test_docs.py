@@ -119,7 +119,10 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
         "replay.record.record", "benchmark.results.read_content",
     ):  # fmt: skip
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
-    for work in ("paper.reproduce.make", "dynamics.__main__.identify", "heldout.__main__.run", "verify.check.check"):
+    for work in (
+        "paper.reproduce.make", "dynamics.__main__.identify", "heldout.__main__.run", "verify.check.check",
+        "leaderboard.__main__.made", "leaderboard.__main__.load",
+    ):  # fmt: skip
         monkeypatch.setattr(f"research.{work}", stop)
     monkeypatch.setattr("uuv_marl.train.run.train", stop_at_once)
     monkeypatch.syspath_prepend(ROOT / "examples" / "extending")

@@ -1,1 +1,1 @@
-"""A table of policies by task that anybody can join: entries are made and checked by commands."""
+"""A table of policies by task that others can join: entries are made and checked by commands."""
