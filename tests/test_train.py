@@ -527,6 +527,21 @@ def test_an_expert_records_the_executed_action_and_acts_as_it_would_alone(beside
     assert np.abs(executed[-1][1] - expected[1]).max() > 1e-3
 
 
+def test_all_messages_are_the_experts_while_it_acts_somewhere():
+    """A network's messages would mislead the expert, whose actions are the targets."""
+    overrides = {"sonar.channels": ["messages"], "modem.message_entries": 5, "modem.message_vectors": 2}
+    training = Training(scenario="few_informed", sizes=[(20, 2)], overrides=overrides, expert="leader_broadcast")
+    env = Rows(training, np.arange)
+    env.groups[0]._expert_acts[:] = True, False
+    for share in (0.5, -0.1):
+        env.schedule(0.0, share)
+        said, done = env.query_expert(np.full((env.rows, 7), 0.3, np.float32))
+        np.testing.assert_array_equal(done[:20], said[:20])
+        np.testing.assert_array_equal(done[20:, :2], np.full((20, 2), 0.3, np.float32))
+        wanted = said[20:, 2:] if share > 0.0 else np.full((20, 5), 0.3, np.float32)
+        np.testing.assert_array_equal(done[20:, 2:], wanted)
+
+
 def test_an_expert_without_its_requirements_is_named(tmp_path):
     for expert, message in (
         ("scoot", "policy 'scoot' is unknown; did you mean 'scout'"),

@@ -91,10 +91,16 @@ class Group:
         return self.env.reset(seeds, worlds)
 
     def query_expert(self, action: Float32) -> tuple[Float32, Float32]:
-        """The expert's actions, and those to execute, in its own worlds the expert's; shape (row, entry)."""
+        """The expert's actions, and those to execute, in its own worlds the expert's; shape (row, entry).
+
+        While it acts in some worlds, all messages are the expert's, since its actions depend on those that it receives.
+        """
         expert = cast(Policy, self._expert)
         expert_action = expert.act(narrowed(self.env.swarm.percept, expert.layout)).reshape(action.shape).copy()
-        return expert_action, np.where(np.repeat(self._expert_acts, self._shape[1])[:, None], expert_action, action)
+        executed = np.where(np.repeat(self._expert_acts, self._shape[1])[:, None], expert_action, action)
+        if self.expert_share > 0.0:
+            executed[:, 2:] = expert_action[:, 2:]
+        return expert_action, executed
 
     def step(self, action: Float32, seeds: Seeds) -> tuple[Transition, Float32]:
         """The transition of the group's rows, and the critic's inputs."""

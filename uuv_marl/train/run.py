@@ -145,7 +145,7 @@ class Trainer:
         self.learner.set_imitation(imitating, 0.0 if imitating else self.training.imitation_weight)
         if imitating:
             expert_share = (_NETWORK_ACTS - share / imitation_share) / (_NETWORK_ACTS - _EXPERT_ACTS)
-            noise, message_noise = _IMITATION_NOISE, 0.0  # noisy messages would mislead all that receive them
+            noise, message_noise = _IMITATION_NOISE, 0.0  # noisy messages would mislead the expert
             rate, share = annealed(_IMITATION_RATE, share / imitation_share), 0.0
         else:
             expert_share, share = 0.0, (share - imitation_share) / (1.0 - imitation_share)
