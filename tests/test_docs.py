@@ -121,7 +121,7 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
     for work in (
         "paper.reproduce.make", "dynamics.__main__.identify", "heldout.__main__.run", "verify.check.check",
-        "leaderboard.__main__.made", "leaderboard.__main__.load",
+        "leaderboard.__main__.made", "leaderboard.__main__.load", "messages.__main__.run",
     ):  # fmt: skip
         monkeypatch.setattr(f"research.{work}", stop)
     monkeypatch.setattr("uuv_marl.train.run.train", stop_at_once)

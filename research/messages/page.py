@@ -12,21 +12,7 @@ from matplotlib.axes import Axes
 
 from research.data import read_text
 from research.episodes import Row, measured, select, short, write_rows
-from research.messages.sets import (
-    BITS,
-    CONTROLLER,
-    LOSSES,
-    METRIC,
-    NETWORKS,
-    PERIODS_S,
-    SILENT,
-    TASK,
-    USUAL,
-    name,
-    network_set,
-)
-from research.messages.shuffled import SHUFFLED
-from research.resampling import estimate, resampled
+from research.messages.sets import BITS, CONTROLLER, LOSSES, METRIC, PERIODS_S, SILENT, TASK, USUAL, name
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.style import house_style, panels, save
 from uuv_marl.benchmark.tables import NOTHING, markdown_table
@@ -51,7 +37,7 @@ def report(rows: Sequence[Row]) -> str:
     return Template(read_text("messages", "story.md")).substitute(
         episodes=f"{len(rows):,}", silent=_cell(rows, TASK, SILENT),
         bits=markdown_table(("", *(f"{period_s:g} s" for period_s in PERIODS_S)), grid),
-        losses=markdown_table(("lost", *(f"{loss:.0%}" for loss in LOSSES)), losses), networks=_networks(rows),
+        losses=markdown_table(("lost", *(f"{loss:.0%}" for loss in LOSSES)), losses),
     )  # fmt: skip
 
 
@@ -66,22 +52,6 @@ def _cell(rows: Sequence[Row], each: str, policy: str) -> str:
     return (
         NOTHING if np.isnan(mean) else f"{short(mean)} [{short(max(mean - half, 0.0))}, {short(min(mean + half, 1.0))}]"
     )
-
-
-def _networks(rows: Sequence[Row]) -> str:
-    """The main metric of the five trainings, with intervals over trainings and maps."""
-    cases = (
-        ("as trained", 0.0, ""), ("40 % of messages lost", LOSSES[2], ""), ("all messages lost", 1.0, ""),
-        ("each message that of another vehicle", 0.0, SHUFFLED),
-    )  # fmt: skip
-    table: list[tuple[str, ...]] = []
-    for words, loss, prefix in cases:
-        own = [select(rows, set=network_set(loss, prefix), policy=prefix + each) for each in NETWORKS]
-        (means,) = resampled([np.array([measured(mine, METRIC) for mine in own])], seed=0)
-        found = estimate(means.mean(axis=1))
-        each = ", ".join(short(float(mean)) for mean in sorted(means[0]))
-        table.append((words, f"{short(found.point)} [{short(found.low)}, {short(found.high)}]", each))
-    return markdown_table(("", "five trainings", "each"), table)
 
 
 def draw(rows: Sequence[Row], path: Path) -> Path:

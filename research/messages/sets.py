@@ -1,13 +1,10 @@
 """Sets of the study: numbers of bits, times of a round, and shares of lost messages."""
 
-from research.messages.shuffled import SHUFFLED
 from research.sets import EpisodeSet
 
 TASK, METRIC = "few_informed", "uninformed_share"
 CONTROLLER, SILENT = "leader_broadcast", "leader_follower"
 """The controller that sends messages, and the best one that sends none."""
-NETWORKS = ("mappo_broadcast", *(f"mappo_broadcast_{k}" for k in range(2, 6)))
-"""Five trainings of a network that sends messages, which run with the usual modem."""
 SEEDS = range(30_000, 30_100)
 """Seeds of the study, which no training, tuning or choosing used."""
 BITS, PERIODS_S, LOSSES = (2, 4, 6, 8), (3.0, 5.0, 12.0, 25.0), (0.0, 0.2, 0.4, 0.6, 0.8)
@@ -29,21 +26,9 @@ def _set(bits: int, period_s: float, loss: float) -> EpisodeSet:
     return EpisodeSet(name(bits, period_s, loss), TASK, {CONTROLLER: SEEDS}, modem)
 
 
-def _networks(loss: float, prefix: str = "") -> EpisodeSet:
-    overrides = {"modem.loss_probability": loss}
-    return EpisodeSet(network_set(loss, prefix), TASK, {prefix + each: SEEDS for each in NETWORKS}, overrides)
-
-
-def network_set(loss: float, prefix: str = "") -> str:
-    """Name of a set of the networks."""
-    return f"{TASK}-network-{loss:g}" + "-shuffled" * bool(prefix)
-
-
 SETS = (
     EpisodeSet(TASK, TASK, {SILENT: SEEDS}),
-    *(_networks(loss) for loss in (0.0, LOSSES[2], 1.0)),
-    _networks(0.0, SHUFFLED),
     *(_set(bits, period_s, 0.0) for bits in BITS for period_s in PERIODS_S),
     *(_set(*USUAL, loss) for loss in LOSSES[1:]),
 )
-"""The controller without messages, the networks, all bits and times without losses, and all losses."""
+"""The controller without messages, all bits and times without losses, and all losses."""
