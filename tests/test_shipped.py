@@ -10,7 +10,7 @@ from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.scenario import scenario_names
 from uuv_marl.sim.observation import observation_layout
-from uuv_marl.train.training import Training, recipe_fields
+from uuv_marl.train.training import Ppo, Training, recipe_fields
 
 RECIPES = ROOT / "examples" / "training"
 NETWORKS = [*(name for name, kind in POLICIES.items() if isinstance(kind, Trained)), *SECOND]
@@ -33,7 +33,8 @@ def test_it_is_what_its_recipe_makes(name):
     card = policy_class(runnable(name)).checkpoint.card
     made = Training(**recipe_fields(str(RECIPES / f"{first}.toml")), seed=int(name != first))
     told = made.model_dump(mode="json")
-    later = {name: told.pop(name) for name in told.keys() - card.training.keys()}  # fields that came after it
-    assert all(Training.model_fields[name].default == value for name, value in later.items())
+    for model, now, then in ((Training, told, card.training), (Ppo, told["ppo"], card.training["ppo"])):
+        later = {name: now.pop(name) for name in now.keys() - then.keys()}  # fields that came after it
+        assert all(model.model_fields[name].default == value for name, value in later.items())
     assert card.training == card.training | told
     assert card == made.card.model_copy(update={"training": card.training})
