@@ -1,15 +1,17 @@
 """Sets of episodes: missing episodes are run, and every finished one is kept."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple
 
+from research import FOLDER
 from research.episodes import Row, cells
 from research.second import runnable
 from uuv_marl.atomic import locked
 from uuv_marl.baselines.registry import policy_class
 from uuv_marl.benchmark.suite import NOTHING, Case, Report, Suite
+from uuv_marl.cli.console import console, explained, progress_line, working
 from uuv_marl.errors import ResultsError
 
 DIGITS = ".3f"
@@ -56,6 +58,21 @@ def run(
             locks.enter_context(locked(folder))
         suite.run(cases, report)
     return [row for policy, case in planned for row in _rows(suite, policy, case, metrics)]
+
+
+def make_page(
+    output: Path, sets: Sequence[EpisodeSet], only: Sequence[str] | None, seeds: int | None, metrics: Sequence[str],
+    write_page: Callable[[Path, Sequence[Row]], Sequence[Path]],
+) -> None:  # fmt: skip
+    """``run`` as a command: with progress, then ``write_page`` from all rows, whose files are printed."""
+    with explained(FOLDER):
+        with working(f"The finished episodes are in {output}") as bar:
+            progress = progress_line(bar, output.name)
+            rows = run(output, sets, only or [], seeds, metrics, lambda what, share: progress(share, what[-60:]))
+            progress(1.0)
+        with locked(output, wait_s=60.0):
+            for path in write_page(output, rows):
+                console.print(f"  {path}", highlight=False)
 
 
 def _rows(suite: Suite, policy: str, case: Case, metrics: Sequence[str]) -> Iterator[Row]:

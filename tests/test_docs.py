@@ -120,8 +120,8 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
     ):  # fmt: skip
         monkeypatch.setattr(f"uuv_marl.{work}", stop)
     for work in (
-        "paper.reproduce.make", "dynamics.__main__.identify", "heldout.__main__.run", "verify.check.check",
-        "leaderboard.__main__.made", "leaderboard.__main__.load", "messages.__main__.run",
+        "paper.reproduce.make", "dynamics.__main__.identify", "heldout.__main__.make_page", "verify.check.check",
+        "leaderboard.__main__.made", "leaderboard.__main__.load", "messages.__main__.make_page",
     ):  # fmt: skip
         monkeypatch.setattr(f"research.{work}", stop)
     monkeypatch.setattr("uuv_marl.train.run.train", stop_at_once)

@@ -5,12 +5,10 @@ from typing import Annotated
 
 import typer
 
-from research import FOLDER
 from research.heldout.page import write_page
 from research.heldout.sets import METRICS, SETS
-from research.sets import run
-from uuv_marl.atomic import locked
-from uuv_marl.cli.console import console, explained, path_option, progress_line, working
+from research.sets import make_page
+from uuv_marl.cli.console import path_option
 
 app = typer.Typer(add_completion=False)
 
@@ -33,14 +31,7 @@ def main(
 
     Example: python -m research.heldout --only single_obstacle --seeds 5
     """
-    with explained(FOLDER):
-        with working(f"The finished episodes are in {output}") as bar:
-            report = progress_line(bar, "held out")
-            rows = run(output, SETS, only or [], seeds, METRICS, lambda what, share: report(share, what[-60:]))
-            report(1.0)
-        with locked(output, wait_s=60.0):
-            for path in write_page(output, rows):
-                console.print(f"  {path}", highlight=False)
+    make_page(output, SETS, only, seeds, METRICS, write_page)
 
 
 if __name__ == "__main__":

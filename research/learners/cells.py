@@ -20,7 +20,7 @@ from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import Scenario, load_scenario
 from uuv_marl.train.validation import shares_of
 
-CURVE, EPISODES, OTHERS = "curve.csv", "episodes.csv", "others"
+CURVE, EPISODES = "curve.csv", "episodes.csv"
 _TRAINERS = {"own": "research.learners.own", "sb3": "research.learners.sb3", "benchmarl": "research.learners.isac"}
 _TRAINED = 0.8
 """Share of the training in a cell's progress; assumed."""
@@ -133,7 +133,7 @@ def read(cell: Cell, folder: Path) -> tuple[list[Row], list[Row]]:
 
 
 def beside(output: Path, report: Report) -> list[Row]:
-    """Episodes of the policies to compare with, and rows of external policies; finished ones are read."""
+    """Episodes of the policies to compare with; finished ones are read."""
     todo = [(task, policy) for task in TASKS.values() for policy in task.policies]
     rows: list[Row] = []
     for k, (task, policy) in enumerate(todo):
@@ -142,8 +142,5 @@ def beside(output: Path, report: Report) -> list[Row]:
         if not path.exists():
             write_rows(path, every(task, policy, lambda _: None))
         rows += [{"task": task.name, "learner": policy, "training": "", **row} for row in read_rows(path)]
-    for path in sorted((output / OTHERS).glob("*/*.csv")):
-        place = {"task": path.parent.name, "learner": f"{path.stem} (checked)", "training": ""}
-        rows += [{**place, **row} for row in read_rows(path)]
     report(1.0)
     return rows

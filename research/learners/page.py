@@ -136,13 +136,13 @@ def _first(groups: Groups) -> str:
 
 
 def _competitors(groups: Groups, task: str) -> list[str]:
-    """Learners, then policies, then external ones."""
+    """Learners, then policies."""
     return list(dict.fromkeys([*LEARNERS, *(competitor for where, competitor, *_ in groups if where == task)]))
 
 
 def _called(competitor: str) -> str:
     """Name of a competitor, for a policy of the package with its extra observations."""
-    return competitor if competitor in LEARNERS or competitor.endswith("(checked)") else named(competitor)
+    return competitor if competitor in LEARNERS else named(competitor)
 
 
 def _tiers(groups: Groups) -> str:

@@ -5,22 +5,17 @@ from typing import Annotated
 
 import typer
 
-from research import FOLDER
 from research.messages.page import write_page
 from research.messages.sets import METRIC, SETS
-from research.sets import run
-from uuv_marl.atomic import locked
-from uuv_marl.cli.console import console, explained, path_option, progress_line, working
+from research.sets import make_page
+from uuv_marl.cli.console import path_option
 
 app = typer.Typer(add_completion=False)
 
 
 @app.command()
 def main(
-    only: Annotated[
-        list[str] | None,
-        typer.Option(help="Run only this set. Repeat it for several."),
-    ] = None,
+    only: Annotated[list[str] | None, typer.Option(help="Run only this set. Repeat it for several.")] = None,
     seeds: Annotated[
         int | None, typer.Option(min=1, max=10_000, help="At most this many seeds of a policy on a set. Default: all.")
     ] = None,
@@ -32,14 +27,7 @@ def main(
 
     Example: python -m research.messages --only few_informed-8-12-0 --seeds 5
     """
-    with explained(FOLDER):
-        with working(f"The finished episodes are in {output}") as bar:
-            report = progress_line(bar, "messages")
-            rows = run(output, SETS, only or [], seeds, [METRIC], lambda what, share: report(share, what[-60:]))
-            report(1.0)
-        with locked(output, wait_s=60.0):
-            for path in write_page(output, rows):
-                console.print(f"  {path}", highlight=False)
+    make_page(output, SETS, only, seeds, [METRIC], write_page)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from tensordict import TensorDict
 from torchrl.envs import ExplorationType, set_exploration_type
 
 from research.episodes import read_rows
-from research.learners import cells, isac, others, page, protocol, statistics, watch
+from research.learners import cells, isac, page, protocol, statistics, watch
 from research.learners.layout import marl_eval
 from research.learners.protocol import LEARNERS, TASKS
 from research.learners.squashed import Squashed
@@ -234,29 +234,6 @@ def test_every_set_of_the_protocol_can_be_run_by_its_learners():
     for task in TASKS.values():
         for each in task.sets:
             load_scenario(each.scenario, overrides=each.overrides)
-
-
-def test_rows_from_elsewhere_are_whole_and_come_again_or_are_refused(tmp_path):
-    task = TASKS["hard_water"]
-    few = task._replace(tiers=tuple((tier[0]._replace(episodes=range(7000, 7002)),) for tier in task.tiers))
-    rows = list(cells.every(few, "scout", quiet))
-    page.write_rows(tmp_path / "rows.csv.gz", rows)
-    assert read_rows(tmp_path / "rows.csv.gz") == rows
-    others.check_complete(rows, few)
-    for row in rows[::3]:
-        others.check_equal(row, "scout", few)
-    for wrong, message in (
-        (rows[1:], "set hard_water must have the seeds 7000 to 7001 once each, got 1 rows"),
-        ([{**rows[0], "set": "lake"}], "set must be one of hard_water, .*, got 'lake'"),
-        ([], "the columns must be set, .*, got no rows"),
-        ([{**row, "colour": "blue"} for row in rows], "the columns must be set, seed, share, .*, got set, .*, colour"),
-    ):
-        with pytest.raises(ResultsError, match=message):
-            others.check_complete(wrong, few)
-    with pytest.raises(ResultsError, match="set hard_water, seed 7000 differs: min_spacing_m 9.9, now"):
-        others.check_equal({**rows[0], "min_spacing_m": "9.9"}, "scout", few)
-    with pytest.raises(ResultsError, match="seed 7000 differs: "):
-        others.check_equal(rows[0], "random", few)
 
 
 @pytest.mark.parametrize("name", LEARNERS)
