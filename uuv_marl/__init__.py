@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from uuv_marl.envs import registration
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 if TYPE_CHECKING:
     from uuv_marl import baselines, uuv_swarm_v2
