@@ -374,8 +374,12 @@ def test_collisions_cost_more_as_a_training_goes_on(tmp_path, no_validation, mon
 
 OWN_TASK = """
 import numpy as np
+from uuv_marl.baselines import Policy
 from uuv_marl.tasks import Task
 from uuv_marl.tasks.reach import Reach
+class Still(Policy):
+    def decide(self, percept):
+        return np.zeros((*percept.flat.shape[:2], 2), np.float32)
 class Mine(Task):
     rewards = {"dense": {"still": "-0.5 m/s for each decision", "collision": "-60 for each"}}
     def at_goal(self):
@@ -396,6 +400,7 @@ def mine(swarm):
 def own_task(tmp_path, monkeypatch):
     (tmp_path / "own_task.py").write_text(OWN_TASK)
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "own_task", raising=False)
 
 
 NEARER = {"name": "own_task:Nearer", "near_m": 20.0}
@@ -416,6 +421,21 @@ def test_collisions_cost_nothing_beyond_a_reward_of_ones_own(fields, cost, own_t
     assert training.ppo.collision_cost == cost
     assert Training(**json.loads(training.model_dump_json())) == training
     assert ("collision costs" in objective(training)) == (cost[1] > 0.0)
+
+
+@pytest.mark.parametrize("fields", [
+    {"reward": "own_task:mine"},
+    {"overrides": {"task": NEARER}},
+    {"expert": "own_task:Still", "imitation_share": 0.5},
+], ids=lambda fields: next(iter(fields)))  # fmt: skip
+def test_a_changed_file_of_ones_own_is_refused_at_a_resume(fields, tmp_path, own_task, no_validation):
+    next(begins := train(tmp_path / "run", small(checkpoint_every=1, **fields)))
+    begins.close()
+    TrainingFolder(tmp_path / "run", None)
+    with (tmp_path / "own_task.py").open("a") as file:
+        file.write("# changed")
+    with pytest.raises(ResultsError, match=r"was started with (\w+) = own_task:\w+ \(.*\), and \1 is own_task:\w+ \("):
+        TrainingFolder(tmp_path / "run", None)
 
 
 def test_a_training_begins_with_its_whole_objective(tmp_path, own_task, no_validation):

@@ -1,7 +1,5 @@
 """Results on disk: every seed and metric, written after each run, so that a stopped benchmark can be resumed."""
 
-import hashlib
-import inspect
 import json
 import os
 import platform
@@ -28,6 +26,7 @@ from uuv_marl.baselines.team_names import members_of
 from uuv_marl.benchmark.evaluate import Run
 from uuv_marl.benchmark.metrics import Metrics
 from uuv_marl.errors import ResultsError
+from uuv_marl.modules import digest, file_digest
 from uuv_marl.paths import UserPath, user_path
 from uuv_marl.scenario import Scenario
 from uuv_marl.scenario.messages import explain
@@ -225,7 +224,7 @@ def trace_path(folder: Path, scenario: str, policy: str, seed: int) -> Path:
 def file_name(name: str, changes: object = ()) -> str:
     """A name for a file: a short one with plain characters alone, and a hash of what this or ``changes`` hides."""
     words = re.sub(r"[^\w.,=+-]", "_", name, flags=re.ASCII)[:_LONGEST_NAME]
-    return words if words == name and not changes else f"{words}.{_hash(repr((name, changes)).encode())[:8]}"
+    return words if words == name and not changes else f"{words}.{digest(repr((name, changes)).encode())[:8]}"
 
 
 def load_trace(path: UserPath) -> Trace:
@@ -254,7 +253,7 @@ def policy_info(policy: str) -> PolicyInfo:
     if required.decision_period_s:
         known["decision_period_s"] = required.decision_period_s
     sources = [_source(member, policy_type) for member, policy_type in types.items()]
-    known["source"] = sources[0] if len(sources) == 1 or not any(sources) else _hash(repr(sources).encode())
+    known["source"] = sources[0] if len(sources) == 1 or not any(sources) else digest(repr(sources).encode())
     if isinstance(policy_type := types.get(policy), Trained):
         known["policy_class"] = policy_type.checkpoint.card.policy_class
     return known
@@ -264,7 +263,7 @@ def _source(policy: str, policy_type: PolicyType) -> str | None:
     """Hash of a policy's checkpoint or file; None for a controller of the package."""
     if isinstance(policy_type, Trained):
         return policy_type.checkpoint.digest
-    return _file_hash(policy_type) if ":" in policy else None
+    return file_digest(policy_type) if ":" in policy else None
 
 
 def requirements_of(known: PolicyInfo) -> PolicyRequirements:
@@ -278,23 +277,14 @@ def source_fingerprint() -> str:
     code = sorted({path for pattern in _SOURCES for path in _PACKAGE.glob(pattern)})
     if Path(__file__).resolve() not in code:  # a package of byte code: a stand-in that mixes with nothing
         return f"unknown {uuid.uuid4().hex[:16]}"
-    return _hash(
+    return digest(
         b"".join(f"{path.relative_to(_PACKAGE).as_posix()}\0".encode() + path.read_bytes() + b"\0" for path in code)
     )
 
 
-def _hash(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()[:16]
-
-
-def _file_hash(kind: type) -> str:
-    """Hash of the file that defines a class."""
-    return _hash(Path(inspect.getfile(kind)).read_bytes())
-
-
 def _tasks(scenarios: Iterable[Scenario]) -> dict[str, str]:
     """Hash of the file of each user-defined task, by its name."""
-    return {each.task.name: _file_hash(each.task_class) for each in scenarios if ":" in each.task.name}
+    return {each.task.name: file_digest(each.task_class) for each in scenarios if ":" in each.task.name}
 
 
 def _versions() -> dict[str, str]:

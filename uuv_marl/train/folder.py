@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
@@ -15,7 +16,8 @@ from uuv_marl import __version__
 from uuv_marl.atomic import locked, write_text, writing
 from uuv_marl.baselines.learned.trained import Trained
 from uuv_marl.baselines.registry import policy_class
-from uuv_marl.errors import PolicyError, ResultsError, ScenarioError, TrainingError
+from uuv_marl.errors import PolicyError, ResultsError, RewardError, ScenarioError, TrainingError
+from uuv_marl.modules import file_digest
 from uuv_marl.scenario.overrides import leaves
 from uuv_marl.train.training import LEARNER, Training
 
@@ -94,7 +96,7 @@ class TrainingFolder:
             before, saved_versions = dict(config["scenarios"]), dict(config["versions"])
             self.until, training = float(config["until"]), Training(**config["training"])
             scenarios_now = _inputs(training)
-        except (ScenarioError, PolicyError, TrainingError) as error:
+        except (ScenarioError, PolicyError, RewardError, TrainingError) as error:
             raise ResultsError(
                 f"the training in {self.path} can't be loaded here: {error}; resume it where it was started"
             ) from None
@@ -212,13 +214,25 @@ def opened(path: Path, training: Training | None, say: Say) -> Iterator[Training
 
 
 def _inputs(training: Training) -> dict[str, Any]:
-    """Inputs of a training beyond its description, by name: its scenarios, and digests of checkpoints that it uses."""
+    """Inputs of a training beyond its description, by name: its scenarios, and digests of what it uses.
+
+    These are checkpoints, and the files of tasks, rewards and policies that are not of the package.
+    """
     contents: dict[str, Any] = {part.name: part.scenario.model_dump(mode="json") for part in training.parts}
+    for scenario in (part.scenario for part in training.parts):
+        if ":" in scenario.task.name:
+            contents[scenario.task.name] = {"task": f"{scenario.task.name} ({file_digest(scenario.task_class)})"}
+    if training.reward and ":" in training.reward:
+        training.reward_for(training.loaded)  # imports its module
+        module = sys.modules[training.reward.partition(":")[0]]
+        contents[training.reward] = {"reward": f"{training.reward} ({file_digest(module)})"}
     others = training.team(LEARNER).members[:-1] if training.others else ()
     for role, name in [("expert", training.expert), *(("others", member) for member in others)]:
         policy_type = policy_class(name) if name else None
         if isinstance(policy_type, Trained):
             contents[name] = {role: f"{name} ({policy_type.checkpoint.digest})"}
+        elif ":" in name:
+            contents[name] = {role: f"{name} ({file_digest(policy_type)})"}
     return contents
 
 
