@@ -169,6 +169,19 @@ def test_who_has_no_gamma_agent_keeps_its_velocity():
 def test_one_broadcast_a_round_brings_all_even_over_hops_and_with_losses():
     """By a slow, short and lossy modem; without messages the same gains lead fewer."""
     poor = {"modem.range_m": 60.0, "modem.guard_m": 60.0, "modem.loss_probability": 0.3}
-    for overrides in ({}, poor):
-        rows = evaluate("leader_broadcast", "few_informed", range(70_000, 70_008), overrides=overrides)
-        assert np.mean([row["task"]["uninformed_share"] for row in rows]) > 0.9
+    for name, overrides in (("leader_broadcast", {}), ("leader_broadcast", poor), ("velocity_broadcast", {})):
+        rows = evaluate(name, "few_informed", range(70_000, 70_008), overrides=overrides)
+        assert np.mean([row["task"]["uninformed_share"] for row in rows]) > 0.85
+
+
+def test_all_repeat_the_velocity_that_the_informed_perceive():
+    """Within two rounds, each rounding it to 8 bits again."""
+    swarm, policy = piloted("velocity_broadcast", "few_informed", worlds=4, seed=70_000)
+    first = policy.act(swarm.percept)
+    assert ((first[..., 4] > 0.0) == swarm.world_map.informed).all()
+    fly(swarm, policy, 50)
+    action, (c, s) = policy.act(swarm.percept), np.moveaxis(swarm.heading, -1, 0)
+    x, y = 5.0 * action[..., 2], 5.0 * action[..., 3]
+    assert (action[..., 4] == 1.0).all()
+    told = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    np.testing.assert_allclose(told, np.repeat(swarm.mean_reference[:, None, 2:], 20, axis=1), atol=0.2)

@@ -12,6 +12,7 @@ from uuv_marl.baselines.comparators import (
     oracle,
     orca,
     proportional,
+    velocity_broadcast,
 )
 from uuv_marl.baselines.learned.checkpoint import is_checkpoint
 from uuv_marl.baselines.learned.trained import Trained
@@ -52,6 +53,7 @@ POLICIES: dict[str, PolicyType] = {
     "orca_informed": orca.OrcaInformed,
     "leader_follower": leader_follower.LeaderFollower,
     "leader_broadcast": leader_broadcast.LeaderBroadcast,
+    "velocity_broadcast": velocity_broadcast.VelocityBroadcast,
     "proportional_tracking": proportional.ProportionalTracking,
     "oracle": oracle.Oracle,
     "tangent_bug": TangentBug,

@@ -96,22 +96,31 @@ def act(
     for w in range(action.shape[0]):
         for i in range(action.shape[1]):
             if worlds[w] and memory.begun[w, i] > 0.0:
-                others, pose, known = remembered(w, i, g, memory), memory.pose[w, i], told.told[w, i]
-                if leads[w, i, 0] > 0.0:
-                    w_x, w_y = leading(w, i, others, g, memory)
-                elif told.is_told[w, i] > 0.0:
-                    x, y = known[2] + g.pull * (known[0] - pose[0]), known[3] + g.pull * (known[1] - pose[1])
-                    w_x, w_y = at_most(x, y, g.speed)
-                    x, y = at_most(g.gather * others[2], g.gather * others[3], g.gather_mps)
-                    w_x, w_y = w_x + x, w_y + y
-                else:
-                    w_x, w_y = following(others, g)
-                w_x, w_y = pushed(w_x, w_y, w, i, g.push, g.push_range, memory)
-                w_x, w_y = modulated(w_x, w_y, w, i, safe.barrier, memory)
-                num = planes_of(w, i, safe, memory)
-                steer_safely(w, i, w_x, w_y, num, safe, memory, action)
+                pose, known = memory.pose[w, i], told.told[w, i]
+                x, y = g.pull * (known[0] - pose[0]), g.pull * (known[1] - pose[1])
+                move(w, i, leads, told.is_told[w, i], (known[2] + x, known[3] + y), g, safe, memory, action)
                 x, y = to_body_axes(known[0] / _FAR_M, known[1] / _FAR_M, pose)
                 v_x, v_y = to_body_axes(known[2] / _FAST_MPS, known[3] / _FAST_MPS, pose)
                 action[w, i, 2], action[w, i, 3], action[w, i, 4], action[w, i, 5] = x, y, v_x, v_y
                 old_s = told.told_age_s[w, i] if told.is_told[w, i] > 0.0 else math.inf
                 action[w, i, 6] = min(2.0 * old_s / _OLD_S, 2.0) - 1.0
+
+
+@compiled
+def move(
+    w: int, i: int, leads: Float32, is_told: float, velocity: tuple[float, float], g: LeaderFollowerGains,
+    safe: Steering, memory: Surroundings, action: Float32,
+) -> None:  # fmt: skip
+    """Write a vehicle's forces: it leads if it is informed, moves with ``velocity`` [m/s] if told, or follows."""
+    others = remembered(w, i, g, memory)
+    if leads[w, i, 0] > 0.0:
+        w_x, w_y = leading(w, i, others, g, memory)
+    elif is_told > 0.0:
+        w_x, w_y = at_most(velocity[0], velocity[1], g.speed)
+        x, y = at_most(g.gather * others[2], g.gather * others[3], g.gather_mps)
+        w_x, w_y = w_x + x, w_y + y
+    else:
+        w_x, w_y = following(others, g)
+    w_x, w_y = pushed(w_x, w_y, w, i, g.push, g.push_range, memory)
+    w_x, w_y = modulated(w_x, w_y, w, i, safe.barrier, memory)
+    steer_safely(w, i, w_x, w_y, planes_of(w, i, safe, memory), safe, memory, action)
