@@ -28,10 +28,11 @@ def test_it_is_end_to_end_and_runs_where_its_task_is(name):
 
 @pytest.mark.parametrize("name", [name for name in NETWORKS if name.startswith("mappo")])
 def test_it_is_what_its_recipe_makes(name):
-    """But for the seed, which a second training of the same recipe has of its own."""
-    first = name.removesuffix("_2")
+    """But for the seed, which each training of the same recipe has of its own."""
     card = policy_class(runnable(name)).checkpoint.card
-    made = Training(**recipe_fields(str(RECIPES / f"{first}.toml")), seed=int(name != first))
+    first, _, number = name.rpartition("_")
+    fields = recipe_fields(str(RECIPES / f"{first if number.isdigit() else name}.toml"))
+    made = Training(**fields, seed=card.training["seed"])
     told = made.model_dump(mode="json")
     for model, now, then in ((Training, told, card.training), (Ppo, told["ppo"], card.training["ppo"])):
         later = {name: now.pop(name) for name in now.keys() - then.keys()}  # fields that came after it

@@ -12,7 +12,21 @@ from matplotlib.axes import Axes
 
 from research.data import read_text
 from research.episodes import Row, measured, select, short, write_rows
-from research.messages.sets import BITS, CONTROLLER, LOSSES, METRIC, PERIODS_S, SILENT, TASK, USUAL, name
+from research.messages.sets import (
+    BITS,
+    CONTROLLER,
+    EXPERT,
+    LOSSES,
+    METRIC,
+    NETWORK,
+    PERIODS_S,
+    SILENT,
+    TASK,
+    USUAL,
+    USUAL_LOSSES,
+    name,
+    usual_name,
+)
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.style import house_style, panels, save
 from uuv_marl.benchmark.tables import NOTHING, markdown_table
@@ -34,10 +48,14 @@ def report(rows: Sequence[Row]) -> str:
         for bits in BITS
     ]
     losses = [(CONTROLLER, *(_cell(rows, name(*USUAL, loss), CONTROLLER) for loss in LOSSES))]
+    networks = [
+        (policy, *(_cell(rows, usual_name(loss), policy) for loss in USUAL_LOSSES)) for policy in (NETWORK, EXPERT)
+    ]
     return Template(read_text("messages", "story.md")).substitute(
         episodes=f"{len(rows):,}", silent=_cell(rows, TASK, SILENT),
         bits=markdown_table(("", *(f"{period_s:g} s" for period_s in PERIODS_S)), grid),
         losses=markdown_table(("lost", *(f"{loss:.0%}" for loss in LOSSES)), losses),
+        networks=markdown_table(("lost", *(f"{loss:.0%}" for loss in USUAL_LOSSES)), networks),
     )  # fmt: skip
 
 

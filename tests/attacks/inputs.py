@@ -419,6 +419,7 @@ def prepare(folder):
 TASKS_OF = {
     "oracle": "hard_water", "carrot_informed": "hard_water", "nearest_target": "silent_targets",
     "mappo_silent_targets": "silent_targets", "mappo_few_informed": "few_informed",
+    "mappo_few_informed_messages": "few_informed",
 }  # fmt: skip
 
 

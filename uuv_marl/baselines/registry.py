@@ -32,6 +32,7 @@ _NETWORKS = {
     "mappo_hard_water": "Trained by MAPPO on hard_water and its hard tier, end to end.",
     "mappo_two_swarms": "Trained by MAPPO on two_swarms, end to end.",
     "mappo_few_informed": "Imitation of leader_follower, then MAPPO on few_informed.",
+    "mappo_few_informed_messages": "Imitation of velocity_broadcast, then MAPPO on few_informed with messages.",
     "mappo_silent_targets": "Trained by MAPPO on silent_targets, end to end.",
     "mappo_all": "One network, trained by MAPPO on random_field, hard_water and two_swarms.",
     "ppo": "Trained by Stable-Baselines3's PPO on short random fields, end to end.",
