@@ -98,7 +98,7 @@ def act(
             if worlds[w] and memory.begun[w, i] > 0.0:
                 pose, known = memory.pose[w, i], told.told[w, i]
                 x, y = g.pull * (known[0] - pose[0]), g.pull * (known[1] - pose[1])
-                move(w, i, leads, told.is_told[w, i], (known[2] + x, known[3] + y), g, safe, memory, action)
+                move_as_told(w, i, leads, told.is_told[w, i], (known[2] + x, known[3] + y), g, safe, memory, action)
                 x, y = to_body_axes(known[0] / _FAR_M, known[1] / _FAR_M, pose)
                 v_x, v_y = to_body_axes(known[2] / _FAST_MPS, known[3] / _FAST_MPS, pose)
                 action[w, i, 2], action[w, i, 3], action[w, i, 4], action[w, i, 5] = x, y, v_x, v_y
@@ -107,7 +107,7 @@ def act(
 
 
 @compiled
-def move(
+def move_as_told(
     w: int, i: int, leads: Float32, is_told: float, velocity: tuple[float, float], g: LeaderFollowerGains,
     safe: Steering, memory: Surroundings, action: Float32,
 ) -> None:  # fmt: skip

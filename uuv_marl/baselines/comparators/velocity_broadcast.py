@@ -10,7 +10,7 @@ Consensus on a heading by exchange is that of Jadbabaie, Lin and Morse, IEEE Tra
 
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from uuv_marl.baselines.comparators.leader_broadcast import move
+from uuv_marl.baselines.comparators.leader_broadcast import move_as_told
 from uuv_marl.baselines.comparators.leader_follower import LeaderFollower, LeaderFollowerGains
 from uuv_marl.baselines.memory.pose import to_body_axes, to_map_axes
 from uuv_marl.baselines.memory.table import Surroundings, with_surroundings
@@ -43,18 +43,18 @@ class VelocityBroadcast(LeaderFollower):
     def remember(self, percept: Percept, worlds: Bool) -> None:
         """Update the surroundings, and what is known of l(t)."""
         super().remember(percept, worlds)
-        update_told(
+        _update_told(
             worlds, self.leads(percept), percept["message_valid"], percept["message"], self.surroundings,
             ToldVelocity(*self.own),
         )  # fmt: skip
 
     def _write(self, percept: Percept, action: Float32) -> None:
         told = ToldVelocity(*self.own)
-        act(self.leads(percept), self.active, self.float_gains, self.safe, self.surroundings, told, action)
+        _act(self.leads(percept), self.active, self.float_gains, self.safe, self.surroundings, told, action)
 
 
 @compiled
-def update_told(
+def _update_told(
     worlds: Bool, leads: Float32, valid: Float32, message: Float32, memory: Surroundings, told: ToldVelocity
 ) -> None:
     """Replace what vehicles know of l(t) by their own perception, or by the latest message of one that knows."""
@@ -73,7 +73,7 @@ def update_told(
 
 
 @compiled
-def act(
+def _act(
     leads: Float32, worlds: Bool, g: LeaderFollowerGains, safe: Steering, memory: Surroundings, told: ToldVelocity,
     action: Float32,
 ) -> None:  # fmt: skip
@@ -82,6 +82,6 @@ def act(
         for i in range(action.shape[1]):
             if worlds[w] and memory.begun[w, i] > 0.0:
                 velocity, is_told = (told.told[w, i, 0], told.told[w, i, 1]), told.is_told[w, i]
-                move(w, i, leads, is_told, velocity, g, safe, memory, action)
+                move_as_told(w, i, leads, is_told, velocity, g, safe, memory, action)
                 x, y = to_body_axes(velocity[0] / _FAST_MPS, velocity[1] / _FAST_MPS, memory.pose[w, i])
                 action[w, i, 2], action[w, i, 3], action[w, i, 4] = x, y, 2.0 * is_told - 1.0
