@@ -309,7 +309,7 @@ def test_the_inner_loop_is_scaled_with_the_vehicle_s_torque(name, change, dampin
 @pytest.mark.parametrize("name", [*POLICIES, "nearest_target,lanes=true", "sdc,safety_filter=true"])
 def test_vehicles_that_perceive_the_same_act_alike(name):
     """No policy but ``random`` uses a vehicle's row; ``identity`` is a channel."""
-    plain = name.partition(",")[0].removeprefix("mappo_").removesuffix("_2")
+    plain = name.partition(",")[0].removeprefix("mappo_").removesuffix("_messages")
     homes = {"nearest_target": "silent_targets", "oracle": "hard_water", "carrot_informed": "hard_water"}
     home = homes.get(plain, plain if plain in scenario_names() else "starter")
     scenario = with_policy_requirements(name, load_scenario(home, num_vehicles=4))
