@@ -47,6 +47,8 @@ class Task(NamedTuple):
     """Channels that all learners observe beyond the sonar."""
     challenge: bool
     """Whether it is in no aggregate."""
+    learners: tuple[str, ...]
+    """Learners that are trained on it."""
 
     @property
     def sets(self) -> tuple[EvaluationSet, ...]:
@@ -110,8 +112,10 @@ def _task(table: Mapping[str, Any]) -> Task:
                 tiers[tier].append(
                     EvaluationSet(name, scenario, (own if scenario == task else added) | other, seeds[tier])
                 )
-    challenge: bool = table.get("challenge", False)
-    return Task(task, table["num_vehicles"], tuple(table["policies"]), tuple(map(tuple, tiers)), channels, challenge)
+    return Task(
+        task, table["num_vehicles"], tuple(table["policies"]), tuple(map(tuple, tiers)), channels,
+        table.get("challenge", False), tuple(table.get("learners", _DATA["learners"])),
+    )  # fmt: skip
 
 
 TASKS = {table["name"]: _task(table) for table in _DATA["tasks"]}

@@ -10,7 +10,11 @@ from tensordict import TensorDict
 from torchrl.envs import ExplorationType, set_exploration_type
 
 from research.episodes import read_rows
+<<<<<<< HEAD
 from research.learners import cells, isac, page, protocol, tune, watch
+=======
+from research.learners import cells, isac, others, page, protocol, tune, watch
+>>>>>>> 5343bde9 (rliable is not used any more)
 from research.learners.layout import marl_eval
 from research.learners.protocol import AGGREGATED, LEARNERS, TASKS, TIE, TUNING
 from research.learners.squashed import Squashed
