@@ -23,6 +23,8 @@ def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
         for row, (column, unit, words) in enumerate(names):
             ax = axes[row * len(TASKS) + k]
             for colour, learner in enumerate(LEARNERS):
+                if learner not in task.learners:
+                    continue
                 _draw(ax, select(curves, task=name, learner=learner), column, unit, f"C{colour}", learner)
             ax.axhline(
                 float(np.mean(measured(controller, "share"))), color="0.4", linestyle="--", label="best controller"

@@ -26,6 +26,8 @@ _ENOUGH = 4
 eighth (400 simulated)."""
 _FEW = 100
 """Fewest episodes for a mean."""
+_CELLS = sum(len(task.learners) for task in TASKS.values())
+"""Trainings with the same seed."""
 Groups = Mapping[tuple[str, ...], Sequence[Row]]
 """Rows by task, learner or policy, training, and set."""
 Means = Mapping[tuple[str, str], Float64]
@@ -47,7 +49,7 @@ def write_page(folder: Path, curves: Sequence[Row], rows: Sequence[Row]) -> list
 def complete(curves: Sequence[Row], rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
     """Curves and rows of the trainings that all learners have on all tasks, and rows of other policies."""
     num = Counter(training for *_, training in grouped(curves, "task", "learner", "training"))
-    shown = {"", *(training for training, learned in num.items() if learned == len(TASKS) * len(LEARNERS))}
+    shown = {"", *(training for training, learned in num.items() if learned == _CELLS)}
     return [row for row in curves if row["training"] in shown], [row for row in rows if row["training"] in shown]
 
 
@@ -55,7 +57,7 @@ def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
     """The page's text, from ``complete`` trainings."""
     curves, rows = complete(curves, rows)
     groups, num_trainings = by_training(rows), len(grouped(curves, "task", "learner", "training"))
-    every, wanted = means(groups), len(TASKS) * len(LEARNERS) * TRAININGS
+    every, wanted = means(groups), _CELLS * TRAININGS
     partial = f" so far (of {wanted})" * (num_trainings < wanted)
     return Template(read_text("learners", "story.md")).substitute(
         first=_first(groups, every), separation=_separation(every), challenge=_challenge(groups, every),
@@ -170,7 +172,9 @@ def _challenge(groups: Groups, every: Means) -> str:
 
 def _competitors(groups: Groups, task: str) -> list[str]:
     """Learners, then policies."""
-    return list(dict.fromkeys([*LEARNERS, *(competitor for where, competitor, *_ in groups if where == task)]))
+    return list(
+        dict.fromkeys([*TASKS[task].learners, *(competitor for where, competitor, *_ in groups if where == task)])
+    )
 
 
 def _called(competitor: str) -> str:
@@ -226,7 +230,7 @@ def _apart(every: Means) -> str:
     if (num := min(values.shape[1] for (_, one), values in every.items() if one in LEARNERS)) < _ENOUGH:
         return f"Each learner has {num} of {TRAININGS} trainings so far, too few for a comparison.\n"
     table: list[tuple[str, ...]] = []
-    for task in TASKS:
+    for task in AGGREGATED:
         apart, alike = list[str](), list[str]()
         for pair in combinations(LEARNERS, 2):
             one, other = (every[task, learner].mean(axis=1) for learner in pair)
@@ -245,6 +249,9 @@ def _compute(curves: Sequence[Row]) -> str:
     for competitor in LEARNERS:
         cells: list[str] = []
         for task in TASKS:
+            if competitor not in TASKS[task].learners:
+                cells.append("–")
+                continue
             last = {
                 row["training"]: row for row in curves if (row["task"], row["learner"]) == (task, competitor)
             }.values()

@@ -10,11 +10,7 @@ from tensordict import TensorDict
 from torchrl.envs import ExplorationType, set_exploration_type
 
 from research.episodes import read_rows
-<<<<<<< HEAD
 from research.learners import cells, isac, page, protocol, tune, watch
-=======
-from research.learners import cells, isac, others, page, protocol, tune, watch
->>>>>>> 5343bde9 (rliable is not used any more)
 from research.learners.layout import marl_eval
 from research.learners.protocol import AGGREGATED, LEARNERS, TASKS, TIE, TUNING
 from research.learners.squashed import Squashed
@@ -112,7 +108,7 @@ def invented(better=(), num=4):
     for task in TASKS.values():
         maps = rng.uniform(0.1, 0.2, 8)
         level = {"random": 0.0, **dict.fromkeys(better, 0.7)}
-        for who in (*LEARNERS, *task.policies):
+        for who in (*task.learners, *task.policies):
             for training in range(num) if who in LEARNERS else ("",):
                 place = {"task": task.name, "learner": who, "training": str(training)}
                 gain = level.get(who, 0.2) + 0.1 * rng.uniform() * (who in LEARNERS)
@@ -132,13 +128,13 @@ def test_the_page_separates_learners_that_differ_and_is_the_same_again():
     curves, rows = invented(better=("ISAC",))
     text = page.report(curves, rows)
     assert text == page.report(curves, rows)
-    for task in TASKS:
+    for task in AGGREGATED:
         (row,) = [line for line in text.splitlines() if line.startswith(f"| {task} |") and " over " in line]
         assert all(f"ISAC over {other}" in row for other in LEARNERS if other != "ISAC")
     equal = [{**row, "share": "0.0" if row["learner"] == "random" else "0.5"} for row in rows]
     table = page._apart(page.means(page.by_training(equal)))
     assert " over " not in table
-    assert table.count(" and ") == len(TASKS) * 10
+    assert table.count(" and ") == len(AGGREGATED) * 10
 
 
 def test_equivalence_and_ties_have_the_margin_of_the_protocol():
@@ -242,8 +238,8 @@ def test_the_layout_is_that_of_marl_eval():
     """As its README has it: environment, task, algorithm, run, then steps and absolute metrics."""
     told = json.loads(json.dumps(marl_eval(*invented())))
     assert list(told) == ["uuv_marl"]
-    for task in told["uuv_marl"].values():
-        assert list(task) == list(LEARNERS)
+    for name, task in told["uuv_marl"].items():
+        assert list(task) == list(TASKS[name].learners)
         for runs in task.values():
             assert list(runs) == ["seed_0", "seed_1", "seed_2", "seed_3"]
             for run in runs.values():
