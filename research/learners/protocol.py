@@ -18,7 +18,7 @@ MEASURES: int = _DATA["measures"]
 TIE: float = _DATA["tie"]
 FLOOR: float = _DATA["floor"]
 TUNING: dict[str, Any] = _DATA["tuning"]
-"""Tasks, minutes, seeds and number of kept settings of the trials."""
+"""Tasks, budget, seeds and number of kept settings of the trials."""
 DISTURBED, LEVEL = "disturbed", 1
 """Name of a set with disturbances, and its level of the robustness axis ``X``."""
 

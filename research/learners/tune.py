@@ -12,7 +12,7 @@ from filelock import FileLock, Timeout
 from research import FOLDER
 from research.episodes import Row, grouped, read_rows, select, write_rows
 from research.learners.cells import check_protocol, emptied, trainer_of
-from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TUNING
+from research.learners.protocol import LEARNERS, TASKS, TUNING
 from research.learners.watch import Report, TrainingRequest
 from uuv_marl.cli.console import console, explained, path_option, progress_line, working
 from uuv_marl.train.validation import validate
@@ -99,9 +99,8 @@ def _done(path: Path) -> Iterator[Row]:
 
 def _score(trial: Trial, folder: Path, output: Path, report: Report) -> Row:
     emptied(folder)  # of an interrupted trial
-    minutes: float = TUNING["minutes"]
-    steps, settings = round(AGENT_STEPS * minutes / MINUTES), LEARNERS[trial.learner].tried[trial.trial]
-    asked = TrainingRequest(TASKS[trial.task], trial.seed, folder, settings, steps, minutes, report)
+    settings, budget = LEARNERS[trial.learner].tried[trial.trial], (TUNING["agent_steps"], TUNING["minutes"])
+    asked = TrainingRequest(TASKS[trial.task], trial.seed, folder, settings, *budget, report)
     curve = trainer_of(LEARNERS[trial.learner])(asked)
     best = max((float(row["share"]) + float(row["swarm_success"])) / 2.0 for row in curve)
     named = {name: str(value) for name, value in trial._asdict().items()}
