@@ -169,9 +169,10 @@ def test_who_has_no_gamma_agent_keeps_its_velocity():
 def test_one_broadcast_a_round_brings_all_even_over_hops_and_with_losses():
     """By a slow, short and lossy modem; without messages the same gains lead fewer."""
     poor = {"modem.range_m": 60.0, "modem.guard_m": 60.0, "modem.loss_probability": 0.3}
-    for name, overrides in (("leader_broadcast", {}), ("leader_broadcast", poor), ("velocity_broadcast", {})):
+    cases = ("leader_broadcast", {}, 0.9), ("leader_broadcast", poor, 0.9), ("velocity_broadcast", {}, 0.85)
+    for name, overrides, least in cases:
         rows = evaluate(name, "few_informed", range(70_000, 70_008), overrides=overrides)
-        assert np.mean([row["task"]["uninformed_share"] for row in rows]) > 0.85
+        assert np.mean([row["task"]["uninformed_share"] for row in rows]) > least
 
 
 def test_all_repeat_the_velocity_that_the_informed_perceive():
