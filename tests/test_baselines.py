@@ -17,7 +17,7 @@ from tests.nets import ANYWHERE
 from tests.processes import ROOT
 from tests.swarms import fly, piloted
 from uuv_marl import load_scenario, parallel_env, scenario_names
-from uuv_marl.baselines import POLICIES, Policy, PolicyError, make_policy, with_policy_requirements
+from uuv_marl.baselines import POLICIES, Policy, PolicyError, PolicyRequirements, make_policy, with_policy_requirements
 from uuv_marl.baselines.paper import bio_inspired, sdc, sff
 from uuv_marl.baselines.scout.gains import DEFAULT_PRESET, PRESETS
 from uuv_marl.benchmark.tuning import OBJECTIVES, SPACES, TRIALS
@@ -262,7 +262,36 @@ class Acts(Policy):
         return np.zeros((*percept.flat.shape[:2], 2), np.float32)
 
 
+class Returns(Policy):
+    """Returns what it is told."""
+
+    output = ()
+
+    def decide(self, percept):
+        return np.zeros(self.output, np.float32)
+
+
+@pytest.mark.parametrize("shape", [(1, 5, 1), (1, 5, 7), (5, 2), (1, 4, 2)])
+def test_actions_of_another_shape_are_refused(shape):
+    env = parallel_env(STARTER)
+    policy = Returns(env.scenario)
+    policy.output = shape
+    env.reset(seed=0)
+    with pytest.raises(PolicyError, match=r"decide must return an array of shape \(1, 5, 2\), got \("):
+        policy.act(env.swarm.percept)
+
+
+def test_a_class_stands_for_its_name():
+    class Slow(Policy):
+        requirements = PolicyRequirements(channels=("compass",), decision_period_s=0.4, yaw_damping_nms=300.0)
+
+    scenario = with_policy_requirements(Slow, load_scenario("tracking"))
+    assert "compass" in scenario.sonar.channels
+    assert (scenario.timing.decision_period_s, scenario.actuators.yaw_damping_nms) == (0.4, 300.0)
+
+
 @pytest.mark.parametrize(("name", "message"), [
+    ("tests.test_baselines:Acts+mappo", r"no attribute 'Acts\+mappo'.*; a team has the form scout@uuv_0\+mappo"),
     ("sff", "link .sonar.channels.*use an environment's for_policy, with_policy_requirements"),
     ("sdc", "compass and link and identity .sonar.channels.*use an environment.s for_policy, with_policy"),
     ("bio_inspired_plus", "yaw damping of 600 .*actuators.yaw_damping_nms.*with_policy_requirements"),

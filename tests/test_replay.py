@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from tests.processes import SETS, cli, quick, refused, succeeds
 from tests.swarms import piloted, run_of
 from tests.test_replay_page import node
+from uuv_marl import load_scenario
 from uuv_marl.benchmark import runner
 from uuv_marl.cli import app
 from uuv_marl.replay import encode
@@ -253,3 +254,20 @@ def test_the_benchmark_ends_with_the_command_that_shows_its_worst_seed(written):
     (same,) = [r for r in rows if r[:3] == (shown.scenario.name, shown.policy, shown.seed)]
     assert shown.metrics == same.metrics
     assert same.metrics["collisions"] == max(r.metrics["collisions"] for r in rows)
+
+
+def test_the_worst_run_of_a_task_has_the_lowest_main_metric():
+    scenario = load_scenario("hard_water")
+
+    class Found:
+        def select(self, *_):
+            shared = {"task_time_s": None, "min_spacing_m": 5.0, "min_obstacle_distance_m": 5.0}
+            measured = [(0.9, 7), (0.2, 0), (0.2, 1)]
+            return [
+                runner.ResultRow("hard_water", "mappo", seed, {
+                    **shared, "collisions": collisions, "task": {"success_share": share, "swarm_success": 0.0},
+                })
+                for seed, (share, collisions) in enumerate(measured)
+            ]  # fmt: skip
+
+    assert runner.worst(Found(), [scenario], ["mappo"], range(3)).seed == 2

@@ -282,7 +282,7 @@ def test_a_users_task_runs_in_the_benchmark_and_the_replay_by_its_name(tmp_path,
 
 @pytest.mark.needs("torch")
 def test_a_task_of_the_follow_kind_is_judged_as_follow_though_it_measures_more():
-    from uuv_marl.train.validation import shares_of
+    from uuv_marl.benchmark.metrics import shares_of
 
     metrics = {"task_time_s": 30.0, "collisions": 0}
     assert shares_of(metrics, "success_share") == shares_of(metrics | {"task": {"mine_m": 1.0}}, "success_share")

@@ -15,10 +15,9 @@ from uuv_marl.atomic import write_text
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.benchmark import evaluate
-from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.benchmark.metrics import Metrics, shares_of
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import Scenario, load_scenario
-from uuv_marl.train.validation import shares_of
 
 CURVE, EPISODES = "curve.csv", "episodes.csv"
 _TRAINERS = {"own": "research.learners.own", "sb3": "research.learners.sb3", "benchmarl": "research.learners.isac"}

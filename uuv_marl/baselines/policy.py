@@ -167,7 +167,10 @@ class Policy:
 
     @final
     def drive(self, percept: Percept, output: Float32) -> Float32:
-        """Actions for the output of ``decide``, which may be overwritten."""
+        """Actions for the output of ``decide``, which may be overwritten. Raises PolicyError for another shape."""
+        shape, wide = percept.flat.shape[:2], {2, self.scenario.action_size}
+        if np.shape(output) not in {(*shape, entries) for entries in wide}:
+            raise PolicyError(f"decide must return an array of shape {(*shape, min(wide))}, got {np.shape(output)}")
         if self.rudder is not None:
             steer_by_rudder(self.flat(percept), self.layout.offsets, self.rudder, output)
         self.record_action(output)

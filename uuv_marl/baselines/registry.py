@@ -78,7 +78,8 @@ def policy_class(name: str) -> PolicyType:
         try:
             policy_type = named_object(plain)
         except ImportError as error:
-            raise PolicyError(f"policy {plain!r} {error}") from None
+            team = "; a team has the form scout@uuv_0+mappo" if "+" in plain else ""
+            raise PolicyError(f"policy {plain!r} {error}{team}") from None
         if not (isinstance(policy_type, type) and issubclass(policy_type, Policy)):
             raise PolicyError(f"policy {plain!r} must be a subclass of uuv_marl.baselines.Policy, got {policy_type!r}")
         return policy_type

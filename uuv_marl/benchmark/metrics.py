@@ -19,6 +19,16 @@ class Metrics(Measures, Success):
     """The task's own measures (``uuv_marl.tasks.Task.metrics``); absent in ``follow``, whose own are the others."""
 
 
+def shares_of(metrics: Metrics, headline: str) -> tuple[float, bool]:
+    """An episode's headline, and swarm success; in ``follow`` arrival without a collision."""
+    own = metrics.get("task", {})
+    if "swarm_success" not in own:
+        swarm_success = metrics["task_time_s"] is not None and not metrics["collisions"]
+        return float(swarm_success), swarm_success
+    share = own.get(headline)
+    return (own["success_share"] if share is None else share) or 0.0, own["swarm_success"] == 1.0
+
+
 def measure(swarm: Swarm) -> dict[str, Float64]:
     """Measures of a swarm in its current state, (world,) or (world, obstacle); docs/benchmark.md defines them."""
     facts, state, constraints = swarm.facts, swarm.state, swarm.scenario.constraints

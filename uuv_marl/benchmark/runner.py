@@ -11,6 +11,7 @@ from uuv_marl.baselines.names import OWN_CLOCK
 from uuv_marl.baselines.registry import is_trained
 from uuv_marl.benchmark.evaluate import blaming, episodes
 from uuv_marl.benchmark.figures import draw_all
+from uuv_marl.benchmark.metrics import shares_of
 from uuv_marl.benchmark.results import ResultRow, Results
 from uuv_marl.benchmark.tables import Table, markdown_table, scenario_table
 from uuv_marl.errors import ScenarioError
@@ -69,15 +70,17 @@ def distinct_names(scenarios: Sequence[Scenario], what: str) -> list[str]:
 
 
 def worst(results: Results, scenarios: Sequence[Scenario], policies: Sequence[str], seeds: Sequence[int]) -> ResultRow:
-    """The worst run: most collisions, then no arrival, then the smallest distance to a vehicle or an obstacle.
+    """The worst run: the lowest main metric, then most collisions, no arrival, the smallest distance to anything.
 
     Of equal runs the first counts, in the given order of scenarios, policies and seeds.
     """
+    headlines = {scenario.name: scenario.task_class.headline for scenario in scenarios}
 
-    def badness(row: ResultRow) -> tuple[int, bool, float]:
+    def badness(row: ResultRow) -> tuple[float, int, bool, float]:
         metrics = row.metrics
+        share, _ = shares_of(metrics, headlines[row.scenario])
         away = [d for d in (metrics["min_spacing_m"], metrics["min_obstacle_distance_m"]) if d is not None]
-        return metrics["collisions"], metrics["task_time_s"] is None, -min(away, default=math.inf)
+        return -share, metrics["collisions"], metrics["task_time_s"] is None, -min(away, default=math.inf)
 
     return max((row for s in scenarios for p in policies for row in results.select(s.name, p, seeds)), key=badness)
 

@@ -82,9 +82,9 @@ def benchmark(
             say(f"  {path}")
         worst = runner.worst(results, scenarios, policies, wanted)
         again = command(files[names.index(worst.scenario)], worst.policy, worst.seed, overrides or [])
-        say(
-            f"The worst episode (by collisions, arrival, distance) is seed {worst.seed} of {worst.policy}. To watch it:"
-        )
+        headline = scenarios[names.index(worst.scenario)].task_class.headline.replace("_", " ")
+        by = f"{headline}, collisions" if "task" in worst.metrics else "collisions, arrival, distance"
+        say(f"The worst episode (by {by}) is seed {worst.seed} of {worst.policy}. To watch it:")
         say(f"  {again}")
         say(f'Next: read the numbers in Python with uuv_marl.benchmark.load("{output}"): needs the extra "analysis".')
 

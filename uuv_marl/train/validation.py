@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.evaluate import Run, episodes
-from uuv_marl.benchmark.metrics import Metrics
+from uuv_marl.benchmark.metrics import shares_of
 from uuv_marl.replay.command import command
 from uuv_marl.scenario import load_scenario
 from uuv_marl.scenario.overrides import leaves
@@ -73,16 +73,6 @@ def _end_s(run: Run) -> float:
     arrived = run.metrics["task_time_s"]
     followed = "swarm_success" not in run.metrics.get("task", {})
     return arrived if followed and arrived is not None else float(run.routes.time_s[-1])
-
-
-def shares_of(metrics: Metrics, headline: str) -> tuple[float, bool]:
-    """An episode's headline, and swarm success; in ``follow`` arrival without a collision."""
-    own = metrics.get("task", {})
-    if "swarm_success" not in own:
-        swarm_success = metrics["task_time_s"] is not None and not metrics["collisions"]
-        return float(swarm_success), swarm_success
-    share = own.get(headline)
-    return (own["success_share"] if share is None else share) or 0.0, own["swarm_success"] == 1.0
 
 
 def replay_command(policy: Path, training: Training, worst: Worst) -> str:
