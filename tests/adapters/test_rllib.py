@@ -182,7 +182,10 @@ def test_every_runner_starts_from_its_own_world(started):
 
 
 def test_the_example_trains_and_goes_on(tmp_path):
-    command = [EXAMPLE, "--scenario=starter", "--steps=100", "--runners=1", f"--output={tmp_path}"]
+    text = EXAMPLE.read_text(encoding="utf-8")
+    assert text.count("16_384") == 1
+    (tmp_path / "example.py").write_text(text.replace("16_384", "4_096"), encoding="utf-8")
+    command = [tmp_path / "example.py", "--steps=100", "--runners=1", f"--output={tmp_path}"]
     for more in ([], ["--resume"]):
         said = python(*command, *more, PYTHONPATH=str(ROOT))
         assert "agent-steps, return of all vehicles" in said
