@@ -14,7 +14,7 @@ from tests.nets import saved
 from tests.processes import cli, quick, refused, succeeds
 from uuv_marl import load_scenario, parallel_env
 from uuv_marl.data import write
-from uuv_marl.data.parquet import described, read_world
+from uuv_marl.data.parquet import read_description, read_world
 from uuv_marl.data.write import data_set_name, write_data_set
 from uuv_marl.errors import PolicyError, ResultsError
 
@@ -204,7 +204,7 @@ def test_parquet_has_a_row_for_each_decision_and_last_observation(tmp_path):
         np.testing.assert_allclose(one.time_s, period * np.arange(len(one)))
         ends = one.terminated.astype(bool) | one.truncated.astype(bool)
         assert ends.tolist() == [False] * (len(one) - 1) + [True]
-    about = described(done.folder / "worlds" / "seed_000001.parquet")
+    about = read_description(done.folder / "worlds" / "seed_000001.parquet")
     assert {one.shape for one in rows.observation} == {(sum(size for _, size, *_ in about["observation"]),)}
     env = gymnasium.make(EnvSpec.from_json(about["environment"]))
     assert env.observation_space.shape == rows.observation[0].shape

@@ -861,6 +861,16 @@ def test_a_first_start_that_was_cut_off_can_be_started_again(tmp_path, no_valida
     assert len(rows(tmp_path / "a")) == 5
 
 
+def test_a_start_without_a_checkpoint_leaves_the_folder_to_another(tmp_path, no_validation):
+    """As after an error in a reward of one's own, which another training may replace."""
+    begun(tmp_path / "a", 1)
+    done = list(train(tmp_path / "a", small(seed=7)))
+    assert [record.iteration for record in done] == [1, 2, 3, 4, 5]
+    assert json.loads((tmp_path / "a" / "config.json").read_text())["training"]["seed"] == 7
+    list(train(tmp_path / "b", small(seed=7)))
+    assert files(tmp_path / "a") == files(tmp_path / "b")
+
+
 def test_what_is_not_its_own_stays(tmp_path, no_validation):
     begun(tmp_path, 2)
     own = tmp_path / "checkpoints"

@@ -21,7 +21,8 @@ def extra(name: str, what: str | None = None) -> Iterator[None]:
         if isinstance(error, MissingExtraError) or library == "uuv_marl":
             raise
         raise MissingExtraError(
-            f"{what or 'this'} needs {library}, which comes with the extra {name!r}: pip install 'uuv_marl[{name}]'",
+            f"{what or 'this'} needs {library}, which comes with the extra {name!r}: pip install 'uuv_marl[{name}]', or "
+            f"in a checkout pip install -c constraints.txt '.[{name}]'",
             name=library,
         ) from None
 

@@ -10,9 +10,10 @@
 #
 # ## The controller
 #
-# A policy is a class with a method `decide`. It gets the percept, the observations of all vehicles, and returns a
-# thrust and a turn for each vehicle, as shares of full force and torque. All arrays begin with the axes world and
-# vehicle, so code for one vehicle acts for all. The cell saves the class in a file for the benchmark.
+# A policy is a class with a method `decide`. It gets the percept, the observations of all vehicles, and returns a force
+# ahead and to starboard for each vehicle, as shares of the full force: so are actions where vehicles decide every
+# 0.5 s, which the class requires. All arrays begin with the axes world and vehicle, so code for one vehicle acts for
+# all. The cell saves the class in a file for the benchmark.
 
 # %%
 # %%writefile mine.py
@@ -24,7 +25,7 @@ from uuv_marl import baselines
 class Careful(baselines.Policy):
     """Move to l(t), and away from every detected vehicle and obstacle."""
 
-    requirements = baselines.PolicyRequirements(yaw_damping_nms=600.0)  # an inner loop that brakes turns
+    requirements = baselines.PolicyRequirements(decision_period_s=0.5, yaw_damping_nms=600.0)
 
     def decide(self, percept):
         detected = np.concatenate([percept["detected"], percept["echo"]], axis=-1)[..., None]
@@ -32,9 +33,7 @@ class Careful(baselines.Policy):
         squared = np.maximum((position**2).sum(axis=-1, keepdims=True), 1.0)
         away = -(detected * position / squared).sum(axis=-2)
         desired = percept["reference_velocity"] + 0.2 * percept["reference"] + 40.0 * away
-        ahead, starboard = desired[..., 0], desired[..., 1]
-        thrust, turn = np.clip(0.12 * ahead, 0.0, 1.0), 0.3 * np.arctan2(starboard, ahead)
-        return np.stack([thrust, turn], axis=-1).astype(np.float32)
+        return (0.12 * desired).astype(np.float32)
 
 
 # %% [markdown]

@@ -22,8 +22,9 @@ class Memory(NamedTuple):
 
 
 class Smooth(baselines.Policy):
-    """Half thrust in the smoothed direction of the reference point, and away from near neighbours."""
+    """The full force in the smoothed direction of the reference point, and away from near neighbours."""
 
+    requirements = baselines.PolicyRequirements(decision_period_s=0.5, yaw_damping_nms=600.0)
     Memory: ClassVar[type[Any] | None] = Memory
 
     def remember(self, percept: Percept, worlds: NDArray[np.bool_]) -> None:
@@ -33,17 +34,17 @@ class Smooth(baselines.Policy):
         self.memory.desired[worlds] += 0.2 * ((to_reference / length) - self.memory.desired)[worlds]
 
     def decide(self, percept: Percept) -> Float32:
-        """Shares of full force and torque, shape (world, vehicle, 2)."""
+        """Force ahead and to starboard, as shares of the full force, shape (world, vehicle, 2)."""
         neighbour, detected = percept["neighbour"], percept["detected"][..., None]
         squared = np.maximum((neighbour**2).sum(axis=-1, keepdims=True), 1.0)
         away = -(detected * neighbour / squared).sum(axis=-2)
         desired = self.memory.desired + 30.0 * away
-        turn = 0.3 * np.arctan2(desired[..., 1], desired[..., 0]) - 0.3 * percept["yaw_rate"][..., 0]
-        return np.stack([np.full_like(turn, 0.5), turn], axis=-1).astype(np.float32)
+        length = np.maximum(np.linalg.norm(desired, axis=-1, keepdims=True), 1.0)
+        return (desired / length).astype(np.float32)
 
 
 if __name__ == "__main__":
-    scenario = load_scenario("starter")
+    scenario = baselines.with_policy_requirements(Smooth, load_scenario("starter"))
     swarm, policy = Swarm(scenario), Smooth(scenario)
     percept, collisions = swarm.reset(seed=0), 0
     while swarm.facts.time_s[0] < 30.0:

@@ -8,7 +8,8 @@ import typer
 
 from research import FOLDER
 from research.leaderboard.entry import check, load, made, save
-from research.leaderboard.page import report
+from research.leaderboard.page import by_set, report
+from research.tasks.page import with_interval
 from research.tasks.studies import STUDIES
 from uuv_marl.atomic import write_text
 from uuv_marl.cli.console import console, explained, path_option, working
@@ -28,8 +29,11 @@ def make(
     Example: python -m research.leaderboard make runs/mine/best --task hard_water --name mine --output mine.json
     """
     with explained(FOLDER), working("Nothing was kept"):
-        save(made(policy, task, name), output)
-    console.print(f"  {output}", highlight=False)
+        entry = made(policy, task, name)
+        save(entry, output)
+    headline = STUDIES[task].headline
+    mean = with_interval(by_set([dict(row) for row in entry.episodes], headline))
+    console.print(f"  {headline.replace('_', ' ')} {mean}: {output}", highlight=False)
 
 
 @app.command("check")

@@ -62,7 +62,7 @@ def _table(task: str, standings: Sequence[Standing]) -> str:
     table = [
         (
             str(rank), each.name, each.kind.policy_class + ", talks" * each.kind.talks,
-            ", ".join(each.kind.channels) or "–", with_interval(_by_set(each.rows, headline)),
+            ", ".join(each.kind.channels) or "–", with_interval(by_set(each.rows, headline)),
             short(float(np.mean(measured(each.rows, "swarm_success")))), f"`{each.kind.digest[:_DIGITS]}`",
         )
         for rank, each in enumerate(sorted(standings, key=mean, reverse=True)[:_SHOWN], 1)
@@ -71,5 +71,6 @@ def _table(task: str, standings: Sequence[Standing]) -> str:
     return markdown_table(heads, table)
 
 
-def _by_set(rows: Sequence[Row], headline: str) -> list[np.ndarray]:
+def by_set(rows: Sequence[Row], headline: str) -> list[np.ndarray]:
+    """Values of the main metric, an array for each set of episodes."""
     return [np.array(measured(mine, headline)) for mine in grouped(rows, "set").values()]

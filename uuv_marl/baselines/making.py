@@ -40,8 +40,10 @@ def _of_team(each: Sequence[PolicyRequirements]) -> PolicyRequirements:
     )  # fmt: skip
 
 
-def with_policy_requirements(name: PolicyLike, scenario: Scenario) -> Scenario:
+def with_policy_requirements(name: PolicyLike | type[Policy], scenario: Scenario) -> Scenario:
     """The scenario with exactly the channels, messages, yaw damping and decision period that a policy requires.
+
+    A class of your own can stand in place of a policy's name.
 
     With ``timing.fixed``, the scenario's damping and period stay, unless the name has ``own_clock=true``. If the
     scenario has ``modem``, it replaces the channel ``link``, except for policies that require both and for trained
@@ -50,6 +52,8 @@ def with_policy_requirements(name: PolicyLike, scenario: Scenario) -> Scenario:
     A team's scenario has the channels and messages of all members. Members without a decision period have that of the
     others. Raises PolicyError if members require different periods, dampings or messages.
     """
+    if isinstance(name, type):
+        return with_requirements(name.__name__, with_parameters(name.requirements, ()), scenario)
     name = policy_name(name)
     required = {member: policy_requirements(member) for member in members_of(name)}
     if name in required:

@@ -69,10 +69,10 @@ def narrowed(percept: Percept, layout: PerceptLayout) -> Percept:
     """The percept with the fields of ``layout`` alone, all of which it must have."""
     if percept.layout == layout:
         return percept
-    return dataclasses.replace(percept, flat=percept.flat[..., columns(percept.layout, layout)], layout=layout)
+    return dataclasses.replace(percept, flat=percept.flat[..., field_entries(percept.layout, layout)], layout=layout)
 
 
-def columns(whole: PerceptLayout, part: PerceptLayout) -> Int64:
+def field_entries(whole: PerceptLayout, part: PerceptLayout) -> Int64:
     """Entries of the flat vector ``whole`` that make up ``part``, shape (entry,)."""
     return np.concatenate([whole.starts[field.name] + np.arange(field.size) for field in part.table])
 

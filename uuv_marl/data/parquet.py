@@ -31,7 +31,7 @@ def write_world(path: Path, episodes: Sequence[Episode], period_s: float, about:
         path: the file, which is replaced.
         episodes: those of the world.
         period_s: time between decisions [s].
-        about: description of the data, for ``described``.
+        about: description of the data, for ``read_description``.
     """
     with replacing(path) as partial:
         tables = [_table(episode, period_s) for episode in episodes]
@@ -60,7 +60,7 @@ def _lists(rows: Float32) -> Any:
     return pa.FixedSizeListArray.from_arrays(rows.reshape(-1), rows.shape[1])
 
 
-def described(path: Path) -> dict[str, Any]:
+def read_description(path: Path) -> dict[str, Any]:
     """The description of a file's data."""
     return json.loads(parquet.read_schema(path).metadata[_ABOUT])
 

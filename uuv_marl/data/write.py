@@ -13,7 +13,7 @@ from uuv_marl.baselines import with_policy_requirements
 from uuv_marl.benchmark.results import file_name, policy_info, source_fingerprint
 from uuv_marl.data.episodes import worlds
 from uuv_marl.data.minari import write_minari
-from uuv_marl.data.parquet import described, num_rows, write_world
+from uuv_marl.data.parquet import num_rows, read_description, write_world
 from uuv_marl.envs.changes import ScenarioLike
 from uuv_marl.envs.solo import SoloEnv
 from uuv_marl.errors import ResultsError
@@ -106,7 +106,7 @@ def _environment(policy: str, scenario: ScenarioLike, observe: Observe) -> tuple
 
 def _is_written(file: Path, about: Mapping[str, Any]) -> bool:
     """Whether a world's file exists. Raises ResultsError if it holds something else."""
-    held = described(file) if file.exists() else about
+    held = read_description(file) if file.exists() else about
     if other := next((key for key, value in about.items() if held.get(key) != value), None):
         raise ResultsError(
             f"{file} was written with another {other}; move {file.parent.parent} away, or give another output"

@@ -86,8 +86,18 @@ class TrainingFolder:
             self.resume_note = self._find() + version_note
             return
         self.training, self.until = training, training.budget
-        if path.exists() and not (path.is_dir() and all(_HIDDEN.fullmatch(inner.name) for inner in path.iterdir())):
+        if path.exists() and not (path.is_dir() and self._holds_nothing()):
             raise ResultsError(f"{path} is not empty; give --resume to continue it, or another --output")
+
+    def _holds_nothing(self) -> bool:
+        """Whether the folder is empty, or only holds a training that ended before its first checkpoint."""
+        names = {inner.name for inner in self.path.iterdir() if not _HIDDEN.fullmatch(inner.name)}
+        started = {"config.json", self._table.name, self._checkpoints.name}
+        return not names or (names <= started and "config.json" in names and not self._found())
+
+    def _found(self) -> list[Path]:
+        """Folders of checkpoints that are complete."""
+        return [path for path in self._checkpoints.glob("*") if path.name.isdecimal() and _ours(path)]
 
     def _read(self) -> tuple[Training, str]:
         """The training that the folder holds, and a message if other versions ran it before."""
@@ -118,8 +128,7 @@ class TrainingFolder:
 
     def _find(self) -> str:
         """Find the last checkpoint; where the training starts, as a message."""
-        checkpoints = [path for path in self._checkpoints.glob("*") if path.name.isdecimal() and _ours(path)]
-        if not checkpoints:
+        if not (checkpoints := self._found()):
             return f"{self.path} holds no checkpoint yet: starting from the beginning"
         last = max(checkpoints, key=lambda path: int(path.name))
         try:

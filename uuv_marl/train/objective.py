@@ -1,5 +1,7 @@
 """The objective of a training as text: rewards with their terms and weights, and additional costs."""
 
+import re
+
 from uuv_marl.scenario import Scenario
 from uuv_marl.train.training import Training
 
@@ -23,10 +25,13 @@ def objective(training: Training) -> str:
 
 
 def _reward(name: str | None, scenario: Scenario) -> tuple[str, str]:
-    """Name of a reward, and a line for its weights and each of its terms; no lines for a function of the user."""
+    """Name of a reward, and lines for its weights and terms; no lines for a function of the user."""
     if name is not None and ":" in name:
         return name, ""
     task, first = scenario.task_class, next(iter(scenario.task_class.rewards))
-    terms = [f"\n  {term}: {formula}" for term, formula in task.rewards.get(name or first, task.rewards[first]).items()]
-    weights = ", ".join(f"{weight} {value:g}" for weight, value in scenario.reward.model_dump().items())
-    return f"{name or first} of task {scenario.task.name}", f"\n  weights w: {weights}{''.join(terms)}"
+    formulas = task.rewards.get(name or first, task.rewards[first])
+    words = {*formulas, *(word.removeprefix("w_") for word in re.findall(r"\w+", " ".join(formulas.values())))}
+    used = {weight: value for weight, value in scenario.reward.model_dump().items() if weight in words}
+    weights = ", ".join(f"{weight} {value:g}" for weight, value in used.items())
+    lines = [f"weights w: {weights}"] * bool(weights) + [f"{term}: {formula}" for term, formula in formulas.items()]
+    return f"{name or first} of task {scenario.task.name}", "".join(f"\n  {line}" for line in lines)

@@ -11,7 +11,7 @@ from uuv_marl.baselines.learned.actor import bound, in_disc
 from uuv_marl.baselines.learned.checkpoint import Card
 from uuv_marl.baselines.making import compose, make_policy, make_team
 from uuv_marl.baselines.policy import Policy, part_of, parts_of
-from uuv_marl.baselines.team import Team, columns, narrowed
+from uuv_marl.baselines.team import Team, field_entries, narrowed
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.percept import Percept
 from uuv_marl.scenario import Scenario
@@ -63,7 +63,7 @@ class Group:
         swarm_scenario = training.swarm_scenario(part)
         self.env = BatchedEnv(swarm_scenario, part.worlds, reward, observe="closeness", keep_terms=False)
         own = observation_layout(scenario, "closeness")
-        self._columns = columns(self.env.layout, own) if training.others else slice(None)
+        self._columns = field_entries(self.env.layout, own) if training.others else slice(None)
         self._network_action = ExternalActionPolicy(scenario, part.worlds, card)
         self._acting = compose(self._network_action, card)
         if training.others:

@@ -197,7 +197,7 @@ def read(message: Float64, c: float, s: float, vectors: int, out: Float32) -> No
 
 
 @compiled
-def limited(time_s: float) -> float:
+def bounded_duration(time_s: float) -> float:
     """A time within the bounds of a percept [s]."""
     return min(max(time_s, DURATION.low), DURATION.high)
 
@@ -212,15 +212,15 @@ def write_packets(
         if not world.state.alive[w, i]:
             continue
         c, s = by_compass(w, i, heading[w, i, 0], heading[w, i, 1], errors)
-        more.time_to_slot[w, i, 0] = limited(packets.next_slot[w, i] * model.slot_s - now_s)
+        more.time_to_slot[w, i, 0] = bounded_duration(packets.next_slot[w, i] * model.slot_s - now_s)
         for k in range(more.neighbour_message_valid.shape[2]):
             j = world.senses.detected_index[w, i, k]
             if j >= 0 and packets.inbox_s[w, i, j] >= 0.0:
                 more.neighbour_message_valid[w, i, k] = 1.0
-                more.neighbour_message_age[w, i, k] = limited(now_s - packets.inbox_s[w, i, j])
+                more.neighbour_message_age[w, i, k] = bounded_duration(now_s - packets.inbox_s[w, i, j])
                 read(packets.inbox[w, i, j], c, s, model.vectors, more.neighbour_message[w, i, k])
         for r in range(NUM_RECENT):
             if packets.recent_s[w, i, r] >= 0.0:
                 more.message_valid[w, i, r] = 1.0
-                more.message_age[w, i, r] = limited(now_s - packets.recent_s[w, i, r])
+                more.message_age[w, i, r] = bounded_duration(now_s - packets.recent_s[w, i, r])
                 read(packets.recent[w, i, r], c, s, model.vectors, more.message[w, i, r])
