@@ -218,13 +218,13 @@ def test_a_one_step_task_is_solved():
     def pay(observation, action):
         return 3.0 * observation[:, 2] - 10.0 * np.sum((action - observation[:, :2] * (0.5, -0.5)) ** 2, axis=1)
 
-    learner, _ = learned(Toy(pay), 120, Ppo(horizon=8, kl_stop=0.05))
+    learner, _ = learned(Toy(pay), 120, Ppo(horizon=8, minibatches=3, kl_stop=0.05))
     assert error_of(learner, (0.5, -0.5, 0, 0)) < 0.1
 
 
 def test_imitation_ignores_the_reward():
     toy = Toy(lambda observation, action: 10.0 * observation[:, 0] * action[:, 0])
-    learner = learner_for(toy, Ppo(horizon=8))
+    learner = learner_for(toy, Ppo(horizon=8, minibatches=3))
     learner.set_imitation(imitating=True)
     batch, _ = learner.sample(toy, 1e-3, 1e-3)
     assert (batch.action - batch.mean).abs().max() < 0.01  # the network acts
@@ -237,7 +237,7 @@ def test_imitation_ignores_the_reward():
 def test_an_imitation_weight_keeps_the_policy_near_the_expert_against_the_reward(imitation_weight, near):
     """Half of the observation is rewarded, and the expert swaps it."""
     toy = Toy(lambda observation, action: -np.square(action - observation[:, :2] * (0.5, -0.5)).sum(axis=1))
-    learner = learner_for(toy, Ppo(horizon=8))
+    learner = learner_for(toy, Ppo(horizon=8, minibatches=3))
     learner.set_imitation(imitating=False, imitation_weight=imitation_weight)
     for _ in range(150):
         learner.update(learner.sample(toy, 0.2, 0.2)[0], 0.2, 0.2, 3e-3)
@@ -247,7 +247,7 @@ def test_an_imitation_weight_keeps_the_policy_near_the_expert_against_the_reward
 @pytest.mark.parametrize("memory", [True, False])
 def test_only_a_memory_recalls(memory):
     """Paid -0.5 every fourth step by who says nothing, that is -0.125; a memory comes near 0, but for its noise."""
-    by = Ppo(horizon=16, gamma=0.9, kl_stop=0.05)
+    by = Ppo(horizon=16, minibatches=3, gamma=0.9, kl_stop=0.05)
     _, rewards = learned(Recall(), 150, by, Architecture(memory=memory, hidden=(16,)))
     assert (np.mean(rewards[-10:]) > -0.05) == memory
     assert np.mean(rewards[-10:]) > -0.2
@@ -257,7 +257,7 @@ def test_only_a_memory_recalls(memory):
 def test_values_of_a_steady_income(cut_off, expected):
     """1 at every step, gamma 0.9: worth 10 where every fourth step only cuts the episode off; where it ends it, worth
     between 1 (the last step) and 3.44 (all four), 2.33 on average, since the time is not observed."""
-    by = Ppo(horizon=16, gamma=0.9, value_decay=0.9)
+    by = Ppo(horizon=16, minibatches=3, gamma=0.9, value_decay=0.9)
     learner, _ = learned(Toy(lambda observation, _: np.ones(len(observation)), 4, cut_off), 80, by)
     x = np.random.default_rng(2).uniform(-1, 1, (200, 3)).astype(np.float32)
     value = learner.value(torch.from_numpy(x), torch.zeros(200, 0), torch.zeros(200, dtype=torch.int64)).mean()
