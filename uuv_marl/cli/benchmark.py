@@ -83,7 +83,7 @@ def benchmark(
         worst = runner.worst(results, scenarios, policies, wanted)
         again = command(files[names.index(worst.scenario)], worst.policy, worst.seed, overrides or [])
         headline = scenarios[names.index(worst.scenario)].task_class.headline.replace("_", " ")
-        by = f"{headline}, collisions" if "task" in worst.metrics else "collisions, arrival, distance"
+        by = f"{headline}, collisions" if "swarm_success" in worst.metrics.get("task", {}) else "collisions, arrival, distance"
         say(f"The worst episode (by {by}) is seed {worst.seed} of {worst.policy}. To watch it:")
         say(f"  {again}")
         say(f'Next: read the numbers in Python with uuv_marl.benchmark.load("{output}"): needs the extra "analysis".')
