@@ -82,8 +82,10 @@ def benchmark(
             say(f"  {path}")
         worst = runner.worst(results, scenarios, policies, wanted)
         again = command(files[names.index(worst.scenario)], worst.policy, worst.seed, overrides or [])
-        headline = scenarios[names.index(worst.scenario)].task_class.headline.replace("_", " ")
-        by = f"{headline}, collisions" if "swarm_success" in worst.metrics.get("task", {}) else "collisions, arrival, distance"
+        by = "collisions, arrival, distance"
+        if "swarm_success" in worst.metrics.get("task", {}):  # other tasks are judged as follow is
+            headline = scenarios[names.index(worst.scenario)].task_class.headline
+            by = f"{headline.replace('_', ' ')}, collisions"
         say(f"The worst episode (by {by}) is seed {worst.seed} of {worst.policy}. To watch it:")
         say(f"  {again}")
         say(f'Next: read the numbers in Python with uuv_marl.benchmark.load("{output}"): needs the extra "analysis".')
