@@ -25,13 +25,13 @@ PAID = [(task, reward) for task in PLACES for reward in task_class(task).rewards
 ONCE = {"arrival", "stay", "held"}
 """Terms that pay for being where one should be; ``progress`` pays or costs, and all others cost."""
 GUIDED = [
-    ("follow", "starter", 5, "dense", 100), ("follow", "starter", 5, "sparse", 30),
-    ("follow", "single_obstacle", 54, "dense", 2), ("reach", "starter", 5, "dense", 100),
-    ("reach", "single_obstacle", 54, "dense", 2), ("hard_water", "hard_water", 10, "dense", 100),
-    ("hard_water", "hard_water", 10, "geodesic", 100), ("two_swarms", "two_swarms_easy", 10, "dense", 100),
-    ("few_informed", "few_informed_easy", 10, "dense", 100), ("few_informed", "few_informed_easy", 10, "leader", 30),
+    ("follow", "starter", 5, "dense", 40), ("follow", "starter", 5, "sparse", 30),
+    ("follow", "single_obstacle", 54, "dense", 2), ("reach", "starter", 5, "dense", 40),
+    ("reach", "single_obstacle", 54, "dense", 2), ("hard_water", "hard_water", 10, "dense", 40),
+    ("hard_water", "hard_water", 10, "geodesic", 40), ("two_swarms", "two_swarms_easy", 10, "dense", 40),
+    ("few_informed", "few_informed_easy", 10, "dense", 40), ("few_informed", "few_informed_easy", 10, "leader", 30),
     ("few_informed", "few_informed", 20, "dense", 8), ("two_swarms", "two_swarms", 40, "dense", 4),
-    ("silent_targets", "silent_targets_easy", 8, "dense", 100),
+    ("silent_targets", "silent_targets_easy", 8, "dense", 40),
 ]  # fmt: skip
 """Task, scenario, vehicles, reward, and how many seeds, from 0 on."""
 
