@@ -6,8 +6,9 @@ from string import Template
 import numpy as np
 
 from research.data import read_text
-from research.episodes import Row, grouped, measured, short
+from research.episodes import Row, grouped, measured, read_rows, short
 from research.second import runnable
+from research.tasks import failures
 from research.tasks.studies import STUDIES, Study, set_name
 from uuv_marl.baselines.making import policy_requirements
 from uuv_marl.baselines.registry import is_trained
@@ -48,6 +49,7 @@ def report(task: str, rows: Sequence[Row]) -> str:
             groups, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
         ),
         final=_final(groups, study),
+        failures=failures.table(read_rows(failures.ROWS), task),
         informed=_shares(groups, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "success_share"),
     )
 

@@ -25,6 +25,8 @@ class Study(NamedTuple):
     """Names of the sets that differ from their scenario in the kind of map only."""
     metrics: tuple[str, ...]
     """The metrics that a row of an episode holds."""
+    failures: tuple[str, ...]
+    """The policies whose failures are counted, the first with a picture."""
 
     @property
     def headline(self) -> str:
@@ -59,7 +61,7 @@ def _study(task: str, table: dict[str, Any]) -> Study:
         name for name, (scenario, fields) in changes.items()
         if scenario == task and not name.endswith(_FINAL) and not {SIZE, INFORMED} & {*fields}
     )  # fmt: skip
-    return Study(sets, task, tuple(own), tuple(table["metrics"]))
+    return Study(sets, task, tuple(own), tuple(table["metrics"]), tuple(table["failures"]))
 
 
 STUDIES = {name: _study(name, _DATA[name]) for name in ("hard_water", "two_swarms", "few_informed", "silent_targets")}
