@@ -1,4 +1,4 @@
-"""Gather by sonar, a task of your own: ``uuv-marl benchmark --scenario starter --set task=task:Rendezvous``."""
+"""Gather by sonar: ``uuv-marl benchmark --scenario starter --set task=task:Rendezvous --policy random``."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar

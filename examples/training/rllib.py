@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-# Read at Ray's import: it then listens on 127.0.0.1 alone and reports no usage. A process has one core.
+# Read at Ray's import: Ray then listens on 127.0.0.1 alone and reports no usage. A process has one core.
 os.environ.update(
     {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0", "RAY_USAGE_STATS_ENABLED": "0", "NUMBA_NUM_THREADS": "1"} | os.environ
 )
@@ -80,7 +80,7 @@ def train(algorithm: Any, steps: int, output: Path) -> None:
 def main() -> None:
     """Train with the options of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenario", default="starter", help="name or TOML file; training_field is the next")
+    parser.add_argument("--scenario", default="starter", help="name or TOML file; then try training_field")
     parser.add_argument("--vehicles", type=int, help="size of the swarm; by default the scenario's")
     parser.add_argument("--steps", type=int, default=1_000_000, help="decisions times vehicles")
     parser.add_argument("--runners", type=int, default=2, help="processes that sample, a core each")

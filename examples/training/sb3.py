@@ -43,7 +43,7 @@ def train(scenario: str, steps: int, num_worlds: int, seed: int) -> PPO:
 def main() -> None:
     """Train with the options of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenario", default="starter", help="name or TOML file; training_field is the next")
+    parser.add_argument("--scenario", default="starter", help="name or TOML file; then try training_field")
     parser.add_argument("--steps", type=int, default=300_000, help="decisions times vehicles")
     parser.add_argument("--worlds", type=int, default=32)
     parser.add_argument("--seed", type=int, default=0)

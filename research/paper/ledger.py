@@ -72,7 +72,8 @@ class Entry(NamedTuple):
     def estimate(self) -> str:
         """Ours with its interval."""
         if isinstance(self.ours, float) and self.low is not None and self.high is not None:
-            return f"{Estimate(self.ours, self.low, self.high):.4g}"
+            numbers = (round(number, 6) for number in (self.ours, self.low, self.high))  # sums differ in the last bit
+            return f"{Estimate(*numbers):.4g}"
         return self.ours if isinstance(self.ours, str) else "–"
 
 

@@ -36,6 +36,7 @@ def report(episodes: Any) -> str:
     return Template((folder / "story.md").read_text(encoding="utf-8")).substitute(
         headline=f"{len(episodes):,} episodes on {', '.join(f'`{name}`' for name in names)}",
         conditions=f"{_calm(names)}; echoes report the {BASE['sonar.echo_reports']} of obstacles",
+        levels=", ".join(str(level) for level in sorted(set(episodes["level"]) - {0})),
         scenarios="\n".join(_scenario(name, own) for name, own in scenarios),
     )
 
