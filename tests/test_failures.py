@@ -17,7 +17,7 @@ def episode(position, away, hit="", failed=True):
     """A vehicle's episode of ``hard_water`` from its positions on a line and its distances."""
     place = np.stack([np.array(position, float), np.zeros(len(position))], axis=1)[:, None]
     swarm = SimpleNamespace(scenario=SimpleNamespace(task=SimpleNamespace(name="hard_water")))
-    return Episode(0, place, np.array(away, float)[:, None], [hit], np.array([failed]), 1, np.zeros((0, 0, 2)), swarm)
+    return Episode(place, np.array(away, float)[:, None], [hit], np.array([failed]), 1, np.zeros((0, 0, 2)), swarm)
 
 
 def test_ways_by_hand():

@@ -35,11 +35,11 @@ from uuv_marl import load_scenario
 from tests.nets import ANYWHERE
 from uuv_marl.baselines import make_policy, with_policy_requirements
 from uuv_marl.sim.swarm import Swarm
-scenario = load_scenario("starter", overrides=json.loads(sys.argv[1]))
+scenario = load_scenario("starter", num_vehicles=3, overrides=json.loads(sys.argv[1]))
 swarm = Swarm(scenario, 2)
 swarm.reset(0)
 for _ in range(8):
-    swarm.step(np.full((2, 5, scenario.action_size), 0.5))
+    swarm.step(np.full((2, 3, scenario.action_size), 0.5))
 bits = {name: array.tobytes().hex() for name, array in swarm.snapshot().items()}
 actions = []
 for name in () if scenario.current.flows else ANYWHERE:

@@ -248,7 +248,7 @@ def test_an_imitation_weight_keeps_the_policy_near_the_expert_against_the_reward
 def test_only_a_memory_recalls(memory):
     """Paid -0.5 every fourth step by who says nothing, that is -0.125; a memory comes near 0, but for its noise."""
     by = Ppo(horizon=16, minibatches=3, gamma=0.9, kl_stop=0.05)
-    _, rewards = learned(Recall(), 150, by, Architecture(memory=memory, hidden=(16,)))
+    _, rewards = learned(Recall(), 80, by, Architecture(memory=memory, hidden=(16,)))
     assert (np.mean(rewards[-10:]) > -0.05) == memory
     assert np.mean(rewards[-10:]) > -0.2
 

@@ -77,7 +77,8 @@ def main(name):
         stop("The %s here is of another Python than this %s; 'make clean' first." % (folder, version))
     print("Installing %s into %s, Python %s; the first time takes a few minutes" % (name, folder, version))
     pip = (os.path.join(folder, "bin", "python"), "-m", "pip")
-    run(*(pip + ("install", "--quiet", "--disable-pip-version-check", "-c", pins) + WANTED[name]))
+    # Modules are compiled when they are imported, most of them never.
+    run(*(pip + ("install", "--quiet", "--disable-pip-version-check", "--no-compile", "-c", pins) + WANTED[name]))
     with open(os.path.join(ROOT, folder, name + ".stamp"), "w"):
         print("Installed after %.0f s" % (time.time() - begin))
 
