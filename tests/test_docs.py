@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import re
+import shlex
 import sys
 import warnings
 from fnmatch import fnmatch
@@ -129,7 +130,7 @@ def test_commands_are_understood(line, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     line = line.replace(" docs/", f" {ROOT / 'docs'}/")
     line = re.sub(r"--policy (runs/\S+|mine:\w+)", "--policy mappo", line)  # a reader's own
-    words = line.removeprefix("python -m ").split()
+    words = shlex.split(line.removeprefix("python -m "))
     command = app if words[0] == "uuv-marl" else importlib.import_module(f"{words[0]}.__main__").app
     done = CliRunner().invoke(command, words[1:])
     missing = "holds no training to resume"  # a training that goes on has a folder

@@ -86,6 +86,15 @@ def test_the_runs_of_a_benchmark_are_compared_in_full(results, tmp_path):
     assert "2 more can't be reproduced here" in output
 
 
+def test_a_task_of_a_file_is_not_executed(results, tmp_path):
+    (tmp_path / "evil.py").write_text("open('ran', 'w')")
+    content = json.loads(results.read_text())
+    content["scenarios"]["starter"]["task"]["name"] = "evil:Task"
+    (tmp_path / "results.json").write_text(json.dumps(content))
+    assert "not reproducible here: task 'evil:Task' is not part of the package" in verify(1, "results.json")
+    assert not (tmp_path / "ran").exists()
+
+
 @pytest.mark.parametrize(("changes", "reason"), [
     ({"policy": "mapo"}, "policy 'mapo' is unknown; did you mean 'mappo'?"),
     ({"set": "nowhere"}, "there is no set 'nowhere' in this version"),

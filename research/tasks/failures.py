@@ -4,13 +4,14 @@
 # Matplotlib leaves the types of its keyword arguments open.
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import typer
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 from PIL import Image
 
 from research import FOLDER
@@ -22,6 +23,7 @@ from uuv_marl.benchmark.style import GREY, ORANGE, SKY, draw_map, house_style, l
 from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.cli.console import console, explained, path_option
 from uuv_marl.errors import ResultsError
+from uuv_marl.replay.events import events_of
 from uuv_marl.scenario import load_scenario
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.tasks import Task
@@ -32,10 +34,13 @@ ROWS = Path(__file__).with_name("failures.csv")
 FIRST, NUM_SHOWN = 30_000, 3
 """First seed; ways in the picture."""
 _STILL_M, _LATE = 40.0, 2.0 / 3.0
-"""A vehicle remains in one place if it is so near its last position from this share of its episode on."""
+"""A vehicle remains in one place if it is so near its last position from this share of its episode on. Assumed."""
+_DETOUR_M = 20.0
+"""Distance to move back from the goal for a detour [m]. Assumed."""
+_COLLISIONS = {"obstacle": "collides with an obstacle", "collision": "collides with a vehicle"}
+"""Ways by the kind of a replay's event."""
+_TARGETS, _INFORMED = "silent_targets", "few_informed"
 app = typer.Typer(add_completion=False)
-_TARGETS = "silent_targets"
-_HITS = ("", "collides with an obstacle", "collides with a vehicle")
 
 
 class Episode(NamedTuple):
@@ -45,43 +50,54 @@ class Episode(NamedTuple):
     """Shape (time, vehicle, 2)."""
     away: Float64
     """Distance to the reference [m], shape (time, vehicle)."""
-    hit: Sequence[str]
-    """What each vehicle's first collision is with, of ``_HITS``."""
-    failed: Bool
-    """Vehicles that count and do not succeed, shape (vehicle,)."""
-    units: int
-    """Number of vehicles that count; in ``silent_targets`` of decisions of the last half, for each target."""
     targets: Float64
     """Positions of the obstacles, shape (time, obstacle, 2)."""
+    collided: Mapping[int, str]
+    """What the first collision of a vehicle is with, of ``_COLLISIONS``, by its index."""
+    counts: Bool
+    """Vehicles whose success the task's main metric counts, shape (vehicle,)."""
     swarm: Swarm
+    """At the episode's end."""
+
+    @property
+    def half(self) -> int:
+        """Number of decisions in the last half."""
+        return (len(self.position) - 1) // 2
+
+    @property
+    def units(self) -> int:
+        """Number of vehicles that count; in ``silent_targets`` of decisions of the last half, for each target."""
+        targets = self.swarm.scenario.task.name == _TARGETS
+        return self.half * self.targets.shape[1] if targets else int(self.counts.sum())
 
 
 class Recorder:
     """A ``watch`` of the evaluation that keeps the samples of one world."""
 
     def __init__(self) -> None:
-        self._samples: list[tuple[Float64, ...]] = []
-        self._hit: list[str] = []
+        self._samples: list[tuple[NDArray[Any] | float, ...]] = []
         self.swarm: Swarm
 
     def __call__(self, swarm: Swarm, _action: Float32 | None) -> None:
         """Record a sample."""
-        self.swarm, facts, hull = swarm, swarm.facts, swarm.scenario.collision.hull_radius_m
-        self._samples.append(
-            (swarm.state.eta[0, :, :2].copy(), facts.away[0].copy(), swarm.world_map.obstacles[0, :, :2].copy())
-        )
-        self._hit = self._hit or [""] * swarm.num_vehicles
-        for k in np.flatnonzero(facts.vehicle_collisions[0]):
-            self._hit[k] = self._hit[k] or _HITS[1 if facts.clearance[0, k] < hull else 2]
+        self.swarm, facts, state = swarm, swarm.facts, swarm.state
+        self._samples.append((
+            state.eta[0, :, :2].copy(), facts.away[0].copy(), swarm.world_map.obstacles[0, :, :2].copy(),
+            float(facts.time_s[0]), state.alive[0].copy(), facts.vehicle_collisions[0].copy(),
+            facts.spacing[0].copy(), facts.clearance[0].copy(),
+        ))  # fmt: skip
 
     def episode(self) -> Episode:
         """The episode that has ended."""
-        position, away, targets = (np.array(values) for values in zip(*self._samples, strict=True))
-        informed, swarm = self.swarm.world_map.informed[0], self.swarm
-        counts = ~informed if swarm.scenario.task.name == "few_informed" else np.ones_like(informed)
-        failed = counts & ~swarm.task.succeeded()[0]
-        units = _half(position) * targets.shape[1] if swarm.scenario.task.name == _TARGETS else int(counts.sum())
-        return Episode(position, away, self._hit, failed, units, targets, swarm)
+        arrays: list[Any] = [np.array(values) for values in zip(*self._samples, strict=True)]
+        position, away, targets, time_s, alive, collisions, spacing, clearance = arrays
+        collided: dict[int, str] = {}
+        for event in events_of(self.swarm.scenario, time_s, alive, collisions, spacing, clearance, None):
+            for k in event.vehicles if event.kind in _COLLISIONS else ():
+                collided.setdefault(k, _COLLISIONS[event.kind])
+        informed = self.swarm.world_map.informed[0]
+        counts = ~informed if self.swarm.scenario.task.name == _INFORMED else np.ones_like(informed)
+        return Episode(position, away, targets, collided, counts, self.swarm)
 
 
 def run_one(policy: str, task: str, seed: int) -> Episode:
@@ -97,28 +113,32 @@ def ways(episode: Episode) -> Iterator[tuple[str, int]]:
     if episode.swarm.scenario.task.name == _TARGETS:
         yield from _not_held(episode)
         return
-    late = int(_LATE * (len(episode.position) - 1))
-    for k in np.flatnonzero(episode.failed).tolist():
-        if episode.hit[k]:
-            yield episode.hit[k], k
-            continue
-        moved = np.linalg.norm(episode.position[late:, k] - episode.position[-1, k], axis=1).max()
-        away = episode.away[late:, k]
-        if moved <= _STILL_M:
-            yield f"remains within {_STILL_M:.0f} m of a place", k
-        elif away[-1] < away[0] - _STILL_M:
-            yield "runs out of time on the way", k
-        else:
-            yield "runs out of time elsewhere", k
+    for k in np.flatnonzero(episode.counts & ~episode.swarm.task.succeeded()[0]).tolist():
+        yield episode.collided.get(k) or _out_of_time(episode, k), k
 
 
-def _half(samples: Float64) -> int:
-    """Number of samples in the last half of an episode."""
-    return (len(samples) - 1) // 2
+def _out_of_time(episode: Episode, k: int) -> str:
+    """Why a vehicle without a collision does not succeed."""
+    position, away, swarm = episode.position[:, k], episode.away[:, k], episode.swarm
+    if swarm.scenario.task.name == _INFORMED:
+        apart = np.linalg.norm(episode.position[-1, swarm.world_map.informed[0]] - position[-1], axis=1)
+        if apart.min() > max(array.range_m for array in swarm.scenario.sonar.arrays):
+            return "ends without an informed vehicle in range"
+    late = position[int(_LATE * (len(position) - 1)) :]
+    if np.linalg.norm(late - position[-1], axis=1).max() <= _STILL_M:
+        return f"remains within {_STILL_M:.0f} m of a place"
+    if not _follows(swarm) and (away - np.minimum.accumulate(away)).max() > _DETOUR_M:
+        return "runs out of time after a detour"
+    return "runs out of time"
+
+
+def _follows(swarm: Swarm) -> bool:
+    """Whether the reference is l(t), and not a goal at rest."""
+    return swarm.task.reference_label == Task.reference_label
 
 
 def _not_held(episode: Episode) -> Iterator[tuple[str, int]]:
-    scenario, half = episode.swarm.scenario, _half(episode.position)
+    scenario, half = episode.swarm.scenario, episode.half
     sensing = max(array.range_m for array in scenario.sonar.arrays if array.kind == "active")
     away = np.linalg.norm(episode.position[:, :, None] - episode.targets[:, None], axis=3).min(axis=1)
     held = away <= scenario.task_numbers.held_m
@@ -178,13 +198,11 @@ def _example(ax: Axes, episode: Episode, index: int) -> None:
     swarm, targets = episode.swarm, episode.swarm.scenario.task.name == _TARGETS
     if not targets:
         corners = swarm.world_map.waypoints[0, swarm.world_map.group[0, index], : int(swarm.world_map.last[0, 0]) + 1]
-        follows = swarm.task.reference_label == Task.reference_label
         discs = swarm.world_map.obstacles[0, : int(swarm.world_map.num_obstacles[0]), [1, 0, 2]].T
-        draw_map(ax, corners[0 if follows else -1 :, ::-1], discs)
-    for moved, colour, label in ((episode.position, GREY, "vehicles"), (episode.targets, SKY, "targets")):
-        if targets or label == "vehicles":
-            lines = ax.plot(*np.moveaxis(moved[:, :, ::-1], 2, 0), color=colour, linewidth=0.8)
-            lines[0].set_label(label)
+        draw_map(ax, corners[0 if _follows(swarm) else -1 :, ::-1], discs)
+    drawn = [(episode.position, GREY, "vehicles"), *([(episode.targets, SKY, "targets")] if targets else [])]
+    for moved, colour, label in drawn:
+        ax.plot(*np.moveaxis(moved[:, :, ::-1], 2, 0), color=colour, linewidth=0.8)[0].set_label(label)
     route = (episode.targets if targets else episode.position)[:, index, ::-1]
     label = "target" if targets else "vehicle"
     ax.plot(*route.T, color=ORANGE, linewidth=1.5, label=f"{label} of this failure")

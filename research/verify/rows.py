@@ -192,6 +192,8 @@ def _flat(metrics: Metrics) -> dict[str, str]:
 
 def _benchmarked(content: Content, cells: Cells) -> Source:
     policy, scenario_data = cells["policy"], content["scenarios"][cells["scenario"]]
+    if ":" in (task := str(scenario_data["task"]["name"])):  # its module would be executed
+        raise ScenarioError(f"task {task!r} is not part of the package")
     try:
         scenario = Scenario.model_validate_json(json.dumps(scenario_data))
     except ValueError as error:
