@@ -257,7 +257,8 @@ class HardWater(Reach):
     def at_goal(self) -> Bool:
         """Vehicles within ``near_m`` of the goal, along the collision-free path."""
         near = self.swarm.facts.away <= self.numbers.near_m
-        near[near] = self._lengths_of(near) <= self.numbers.near_m
+        if near.any():
+            near[near] = self._lengths_of(near) <= self.numbers.near_m
         return near
 
     def metrics(self, world: int) -> dict[str, float | None]:

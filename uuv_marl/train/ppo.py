@@ -81,7 +81,7 @@ class Learner:
         layers = zip(itertools.pairwise(wide), [math.sqrt(2.0)] * len(_CRITIC) + [1.0], strict=True)
         self.critic = [started(shape, rng, gain) for (a, b), gain in layers for shape in ((a, b), (b,))]
         self._parts = (list(self.actor.tensors.values()), self.critic)
-        self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
+        self._optimiser = self._adam()
         self._moments = np.zeros((3, num_parts))  # running weight, sum and sum of squares of returns
         self.state = torch.zeros(len(part), self.actor.units)
         self.imitating = False
@@ -89,10 +89,13 @@ class Learner:
         self.imitation_weight = 0.0
         """Weight in PPO's loss of the squared distance from the expert's action [1]."""
 
+    def _adam(self) -> torch.optim.Adam:
+        return torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5, fused=True)
+
     def set_imitation(self, imitating: bool, imitation_weight: float = 0.0) -> None:
         """Switch imitation on or off, and set ``imitation_weight`` of PPO's loss."""
         if self.imitating and not imitating:  # the old moments would double the first updates' divergence
-            self._optimiser = torch.optim.Adam([*self._parts[0], *self._parts[1]], eps=1e-5)
+            self._optimiser = self._adam()
         self.imitating, self.imitation_weight = imitating, imitation_weight
 
     def _critic_output(self, x: Tensor, state: Tensor, part: Tensor) -> Tensor:

@@ -210,8 +210,9 @@ def fixed_torch() -> Iterator[None]:
         for get, put, value in _TORCH:
             stack.callback(put, get())
             put(value)
-        modes = torch.device("cpu"), torch.autocast("cpu", enabled=False), torch.inference_mode(False)
-        for mode in (*modes, torch.enable_grad()):
+        if torch.get_default_device() != torch.device("cpu"):  # this mode slows every operation
+            stack.enter_context(torch.device("cpu"))
+        for mode in (torch.autocast("cpu", enabled=False), torch.inference_mode(False), torch.enable_grad()):
             stack.enter_context(mode)
         yield
 
