@@ -61,7 +61,12 @@ def check_protocol(output: Path) -> None:
 
 def cells(tasks: list[str], learners: list[str], trainings: int) -> list[Cell]:
     """All cells of these tasks and learners, the first seed of each first."""
-    chosen = [(TASKS[task], LEARNERS[name]) for task in tasks or TASKS for name in learners or LEARNERS]
+    chosen = [
+        (TASKS[task], LEARNERS[name])
+        for task in tasks or TASKS
+        for name in learners or LEARNERS
+        if name in TASKS[task].learners
+    ]
     return [Cell(task, learner, seed) for seed in range(trainings) for task, learner in chosen]
 
 

@@ -24,7 +24,6 @@ from research.episodes import Row
 from research.learners.watch import TrainingRequest, Watch
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.train.rows import TRAINING_SEEDS
-from uuv_marl.train.training import overrides_for
 
 REPLAYED = 500_000
 """Size of the replay buffer, in agent-steps."""
@@ -84,7 +83,7 @@ def learn(asked: TrainingRequest) -> list[Row]:
     algorithm = IsacConfig.get_from_yaml()
     algorithm.alpha_init = settings["alpha_init"]
     model = MlpConfig(num_cells=[64, 64], layer_class=torch.nn.Linear, activation_class=torch.nn.Tanh)
-    options = {"observe": "closeness", "num_vehicles": task.num_vehicles, "overrides": overrides_for(task.name, {})}
+    options = {"observe": "closeness", "num_vehicles": task.num_vehicles, "overrides": task.overrides}
     with (folder / "benchmarl.log").open("w") as log, redirect_stderr(log), redirect_stdout(log), suppress(_SpentError):
         Experiment(
             task=getattr(SwarmTask, task.name.upper()).get_task(options), algorithm_config=algorithm,

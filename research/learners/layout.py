@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from research.episodes import Row, grouped, measured
-from research.learners.protocol import AGENT_STEPS, LEARNERS, MEASURES, TASKS
+from research.learners.protocol import AGENT_STEPS, MEASURES, TASKS
 
 ENVIRONMENT = "uuv_marl"
 _METRICS = ("share", "swarm_success", "collisions_per_vehicle")
@@ -18,7 +18,9 @@ def marl_eval(curves: Sequence[Row], rows: Sequence[Row]) -> dict[str, Any]:
     are the tenths of the budget in agent-steps. Each has the measure nearest to it: a training that time ended sooner
     stays at its last one. The absolute metrics are those of the best policy in the final episodes.
     """
-    layout: dict[str, dict[str, dict[str, Any]]] = {task: {name: {} for name in LEARNERS} for task in TASKS}
+    layout: dict[str, dict[str, dict[str, Any]]] = {
+        name: {learner: {} for learner in task.learners} for name, task in TASKS.items()
+    }
     for (task, learner, training), run in grouped(curves, "task", "learner", "training").items():
         layout[task][learner][f"seed_{training}"] = {f"step_{k}": _at(step, run) for k, step in enumerate(_STEPS)}
     first = {task: each.tiers[0][0].name for task, each in TASKS.items()}

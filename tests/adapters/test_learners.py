@@ -10,11 +10,11 @@ from tensordict import TensorDict
 from torchrl.envs import ExplorationType, set_exploration_type
 
 from research.episodes import read_rows
-from research.learners import cells, isac, page, protocol, statistics, watch
+from research.learners import cells, isac, page, protocol, tune, watch
 from research.learners.layout import marl_eval
-from research.learners.protocol import LEARNERS, TASKS
+from research.learners.protocol import AGGREGATED, LEARNERS, TASKS, TIE, TUNING
 from research.learners.squashed import Squashed
-from research.learners.statistics import improvement, interquartile_mean
+from research.learners.statistics import estimate, improvement, interquartile_mean, resampled
 from tests.processes import ROOT
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario
@@ -101,39 +101,78 @@ def test_what_isac_learned_acts_alike_without_torch(tmp_path, monkeypatch):
     assert np.abs(wanted).max() > 0.01
 
 
-def invented(better=()):
-    """Rows and curves of four trainings; some learners are better."""
+def invented(better=(), num=4):
+    """Rows and curves of some trainings; some learners are better."""
     rng = np.random.default_rng(0)
     curves, rows = [], []
     for task in TASKS.values():
-        for who in (*LEARNERS, *task.policies):
-            for training in range(4) if who in LEARNERS else ("",):
+        maps = rng.uniform(0.1, 0.2, 8)
+        level = {"random": 0.0, **dict.fromkeys(better, 0.7)}
+        for who in (*task.learners, *task.policies):
+            for training in range(num) if who in LEARNERS else ("",):
                 place = {"task": task.name, "learner": who, "training": str(training)}
-                share = 0.1 * rng.uniform() + 0.5 * (who in better)
+                gain = level.get(who, 0.2) + 0.1 * rng.uniform() * (who in LEARNERS)
                 for each in task.sets:
-                    values = dict.fromkeys(cells.MEASURES, "1") | {"share": f"{share:.3g}", "time_ratio": ""}
-                    rows += [place | {"set": each.name, "seed": str(seed)} | values for seed in (7000, 7001)]
+                    values = dict.fromkeys(cells.MEASURES, "1") | {"time_ratio": ""}
+                    rows += [
+                        place | {"set": each.name, "seed": str(7000 + k)} | values | {"share": f"{gain + maps[k]:.3g}"}
+                        for k in range(len(maps))
+                    ]
                 measured = {"minutes": "1.00", "share": "0.1", "swarm_success": "0", "collisions_per_vehicle": "2"}
                 if who in LEARNERS:
                     curves += [place | measured | {"agent_steps": str(k)} for k in (1000, 2000)]
     return curves, rows
 
 
-def alike(rows):
-    return [{**row, "share": "0.5"} for row in rows]
-
-
-def test_the_page_tells_learners_apart_where_they_are_and_comes_again_alike(monkeypatch):
-    monkeypatch.setattr(statistics, "_OF_PAIRS", 25)
+def test_the_page_separates_learners_that_differ_and_is_the_same_again():
     curves, rows = invented(better=("ISAC",))
-    state = np.random.get_state()[1].copy()  # noqa: NPY002
     text = page.report(curves, rows)
     assert text == page.report(curves, rows)
-    np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
-    for task in TASKS:
+    for task in AGGREGATED:
         (row,) = [line for line in text.splitlines() if line.startswith(f"| {task} |") and " over " in line]
         assert all(f"ISAC over {other}" in row for other in LEARNERS if other != "ISAC")
-    assert not any(" over " in row for row in page._apart(page.by_training(alike(rows))).splitlines())
+    equal = [{**row, "share": "0.0" if row["learner"] == "random" else "0.5"} for row in rows]
+    table = page._apart(page.means(page.by_training(equal)))
+    assert " over " not in table
+    assert table.count(" and ") == len(AGGREGATED) * 10
+
+
+def test_equivalence_and_ties_have_the_margin_of_the_protocol():
+    """Learners that differ by a little more than a tie are not equivalent, those that differ by less are."""
+    rng = np.random.default_rng(3)
+    maps = rng.uniform(0.2, 0.8, (1, 200))
+    for gap, tied in ((TIE - 0.01, True), (TIE + 0.01, False)):
+        one, other = resampled([np.repeat(maps + gap, 5, axis=0), np.repeat(maps, 5, axis=0)], seed=0)
+        assert improvement(one[..., None], other[..., None], TIE)[0] == (0.5 if tied else 1.0)
+        found = estimate(one.mean(axis=1) - other.mean(axis=1))
+        assert found.low == pytest.approx(found.high)  # the same maps for both
+        assert (found.high < TIE) == tied
+
+
+def test_intervals_are_over_trainings_and_maps():
+    rng = np.random.default_rng(5)
+    trainings, maps = rng.normal(0.0, 0.1, (5, 1)), rng.normal(0.0, 0.1, (1, 20))
+    widths = []
+    for scores in (trainings + 0.0 * maps, 0.0 * trainings + maps, trainings + maps):
+        (found,) = resampled([scores], seed=0)
+        low, high = estimate(found.mean(axis=1))[1:]
+        widths.append(high - low)
+        assert found[0] == pytest.approx(scores.mean(axis=1))
+    assert widths[0] > 0.1
+    assert widths[1] > 0.05
+    assert widths[2] == pytest.approx(np.hypot(*widths[:2]), rel=0.15)
+
+
+def test_a_task_at_the_floor_leaves_the_aggregates():
+    curves, rows = invented()
+    floored = [
+        {**row, "share": "0.01"} if row["task"] == "silent_targets" and row["learner"] in (*LEARNERS, "random") else row
+        for row in rows
+    ]
+    every = page.means(page.by_training(floored))
+    assert page.compared(every) == [task for task in AGGREGATED if task != "silent_targets"]
+    assert "few_informed" not in page.compared(page.means(page.by_training(rows)))
+    assert page.report(curves, rows) != page.report(curves, floored)
 
 
 def test_the_page_shows_the_trainings_that_all_learners_have():
@@ -145,7 +184,7 @@ def test_the_page_shows_the_trainings_that_all_learners_have():
     shown = page.complete(lacking, rows)
     assert {row["training"] for row in shown[0]} == {"0", "1", "2"}
     assert {row["training"] for row in shown[1]} == {"", "0", "1", "2"}
-    assert "too few for a comparison" in page._apart(page.by_training(shown[1]))
+    assert "too few for a comparison" in page._apart(page.means(page.by_training(shown[1])))
 
 
 def test_the_shipped_page_and_file_are_made_of_the_shipped_rows():
@@ -189,20 +228,18 @@ def test_what_the_page_finds_is_in_the_shipped_rows():
 
 
 def test_estimates_are_what_they_say():
-    scores = np.linspace(0.0, 1.0, 40).reshape(8, 5)
-    found = interquartile_mean(scores)
-    assert found.point == pytest.approx(np.sort(scores.ravel())[10:30].mean())
-    assert found.low < found.point < found.high
-    assert improvement(scores + 2.0, scores) == (1.0, 1.0, 1.0)
-    assert improvement(scores, scores).point == 0.5
+    scores = np.linspace(0.0, 1.0, 40).reshape(1, 8, 5)
+    assert interquartile_mean(scores) == pytest.approx(np.sort(scores.ravel())[10:30].mean())
+    assert improvement(scores + 2.0, scores, TIE) == 1.0
+    assert improvement(scores, scores, TIE) == 0.5
 
 
 def test_the_layout_is_that_of_marl_eval():
     """As its README has it: environment, task, algorithm, run, then steps and absolute metrics."""
     told = json.loads(json.dumps(marl_eval(*invented())))
     assert list(told) == ["uuv_marl"]
-    for task in told["uuv_marl"].values():
-        assert list(task) == list(LEARNERS)
+    for name, task in told["uuv_marl"].items():
+        assert list(task) == list(TASKS[name].learners)
         for runs in task.values():
             assert list(runs) == ["seed_0", "seed_1", "seed_2", "seed_3"]
             for run in runs.values():
@@ -224,8 +261,9 @@ def test_a_step_is_the_nearest_measure_and_after_its_end_a_training_stays_at_its
     learner = next(iter(LEARNERS))
     row = {"task": "hard_water", "learner": learner, "training": "0", "minutes": "1"}
     row |= {"swarm_success": "0", "collisions_per_vehicle": "0"}
-    ends = {400_000: "0.1", 700_000: "0.2", 1_600_000: "0.3"}
-    curve = [{**row, "agent_steps": str(k), "share": share} for k, share in ends.items()]
+    tenth = protocol.AGENT_STEPS // protocol.MEASURES
+    ends = {0.8: "0.1", 1.4: "0.2", 3.2: "0.3"}
+    curve = [{**row, "agent_steps": f"{k * tenth:.0f}", "share": share} for k, share in ends.items()]
     run = marl_eval(curve, [])["uuv_marl"]["hard_water"][learner]["seed_0"]
     assert [step["share"] for step in run.values()] == [[0.1], [0.2], *[[0.3]] * (protocol.MEASURES - 2)]
 
@@ -238,7 +276,10 @@ def test_every_set_of_the_protocol_can_be_run_by_its_learners():
 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_a_learner_has_the_best_of_the_settings_that_were_tried(name):
-    learner = LEARNERS[name]
     rows = [row for row in read_rows(ROOT / "research" / "learners" / "trials.csv") if row["learner"] == name]
-    assert [json.loads(row["settings"]) for row in rows] == list(learner.tried)
-    assert learner.chosen == np.argmax([float(row["score"]) for row in rows])
+    first, second = ([row for row in rows if row["seed"] == str(seed)] for seed in TUNING["seeds"])
+    assert {int(row["trial"]) for row in first} == set(range(len(LEARNERS[name].tried)))
+    again = tune.kept(first, name)
+    assert {int(row["trial"]) for row in second} == set(again)
+    scores = {k: np.mean([float(row["score"]) for row in rows if row["trial"] == str(k)]) for k in again}
+    assert LEARNERS[name].chosen == max(scores, key=lambda k: scores[k])
