@@ -112,7 +112,7 @@ def test_the_batch_changes_no_byte(tmp_path, monkeypatch):
     """Worlds of different lengths, in batches of three, two and one."""
     policy, scenario = "bio_inspired", short("starter", 60.0)
     whole = write_data_set(tmp_path / "a", policy, scenario, range(5))
-    monkeypatch.setattr("uuv_marl.data.episodes.BATCH", 2)
+    monkeypatch.setattr("uuv_marl.data.episodes.batch_size", lambda _: 2)
     pairs = write_data_set(tmp_path / "b", policy, scenario, reversed(range(5)))
     monkeypatch.setattr("uuv_marl.data.episodes._MOST_BYTES", 1)
     alone = write_data_set(tmp_path / "c", policy, scenario, range(5))

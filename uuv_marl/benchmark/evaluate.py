@@ -17,8 +17,8 @@ from uuv_marl.sim.arguments import whole_number
 from uuv_marl.sim.swarm import Swarm
 from uuv_marl.types import Float32
 
-BATCH = 8
-"""Seeds stepped together: enough for all cores, and few to repeat after a benchmark is stopped."""
+_FEWEST, _VEHICLES = 8, 320
+"""Seeds stepped together, and vehicles: enough for all cores, and few episodes to repeat after a stop."""
 ROUTE_PERIOD_S = 0.5
 """Time between two samples of the trajectories [s]."""
 MOST_SAMPLES = 1_500_000
@@ -76,11 +76,12 @@ def episodes(
 
     Raises:
         DivergenceError: the integration step was too long for a vehicle. This run has no metrics; those of the other
-            seeds of its batch of ``BATCH`` are yielded first.
+            seeds that were stepped with it are yielded first.
     """
     seeds = [whole_number("seed", seed, 0) for seed in seeds]
-    for first in range(0, len(seeds), BATCH):
-        batch = seeds[first : first + BATCH]
+    num = batch_size(scenario.swarm.num_vehicles)
+    for first in range(0, len(seeds), num):
+        batch = seeds[first : first + num]
 
         def note(share: float, first: int = first, size: int = len(batch)) -> None:
             if report:
@@ -115,6 +116,11 @@ def evaluate(
     with blaming(name):
         runs = [*episodes(changed(scenario, name, **changes), name, given)]
     return [{"seed": run.seed, **run.metrics} for run in sorted(runs, key=lambda run: given.index(run.seed))]
+
+
+def batch_size(num_vehicles: int) -> int:
+    """Number of swarms of ``num_vehicles`` that are stepped together; it changes no bit of an episode."""
+    return max(_FEWEST, _VEHICLES // num_vehicles)
 
 
 @contextmanager

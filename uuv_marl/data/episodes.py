@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uuv_marl.baselines import make_policy
-from uuv_marl.benchmark.evaluate import BATCH, blaming
+from uuv_marl.benchmark.evaluate import batch_size, blaming
 from uuv_marl.envs.core import BatchedEnv
 from uuv_marl.envs.ending import succeeded
 from uuv_marl.scenario import Scenario
@@ -51,7 +51,7 @@ def worlds(scenario: Scenario, policy: str, seeds: Sequence[int], observe: Obser
     """
     one = BatchedEnv(scenario, observe=observe)
     each = (one.longest_episode + 1) * one.swarm.num_vehicles * one.layout.size * 4
-    size = max(1, min(BATCH, _MOST_BYTES // each))
+    size = max(1, min(batch_size(one.swarm.num_vehicles), _MOST_BYTES // each))
     with blaming(policy):
         for first in range(0, len(seeds), size):
             yield from _batch(scenario, policy, seeds[first : first + size], observe)
