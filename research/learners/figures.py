@@ -29,7 +29,7 @@ def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
             ax.axhline(
                 float(np.mean(measured(controller, "share"))), color="0.4", linestyle="--", label="best controller"
             )
-            ax.set(title=name, xlabel=words, ylabel="headline", ylim=(-0.02, 1.02))
+            ax.set(title=name, xlabel=words, ylabel="main metric", ylim=(-0.02, 1.02))
     axes[0].legend()
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)

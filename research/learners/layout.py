@@ -19,9 +19,7 @@ def marl_eval(curves: Sequence[Row], rows: Sequence[Row]) -> dict[str, Any]:
     stays at its last one. The absolute metrics are those of the best policy in the final episodes. Marl-eval needs all
     algorithms on all tasks, so the challenge is left out.
     """
-    layout: dict[str, dict[str, dict[str, Any]]] = {
-        task: {learner: {} for learner in LEARNERS} for task in AGGREGATED
-    }
+    layout: dict[str, dict[str, dict[str, Any]]] = {task: {learner: {} for learner in LEARNERS} for task in AGGREGATED}
     curves = [row for row in curves if row["task"] in AGGREGATED]
     for (task, learner, training), run in grouped(curves, "task", "learner", "training").items():
         layout[task][learner][f"seed_{training}"] = {f"step_{k}": _at(step, run) for k, step in enumerate(_STEPS)}

@@ -59,7 +59,9 @@ def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
     groups, num_trainings = by_training(rows), len(grouped(curves, "task", "learner", "training"))
     every, wanted = means(groups), _CELLS * TRAININGS
     partial = f" so far (of {wanted})" * (num_trainings < wanted)
+    unseen, *others = (len(each.episodes) for each in next(iter(TASKS.values())).sets)
     return Template(read_text("learners", "story.md")).substitute(
+        unseen=unseen, other=others[0],
         first=_first(groups, every), separation=_separation(every), challenge=_challenge(groups, every),
         tiers=_tiers(groups), safety=_safety(groups), pairs=_pairs(every), apart=_apart(every),
         compute=_compute(curves), settings=_settings(), episodes=f"{len(rows):,}", steps=f"{AGENT_STEPS / 1e6:g}",

@@ -32,7 +32,7 @@ def quiet(_):
 @pytest.mark.parametrize("name", LEARNERS)
 def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, monkeypatch):
     task = TASKS["hard_water"]
-    small = tuple(tuple(each._replace(episodes=range(7000, 7001)) for each in tier[:1]) for tier in task.tiers)
+    small = tuple(tuple(each._replace(episodes=range(40_000, 40_001)) for each in tier[:1]) for tier in task.tiers)
     task = task._replace(tiers=small)
     monkeypatch.setattr(cells, "AGENT_STEPS", 45_000)
     for module in (protocol, watch):
@@ -51,7 +51,7 @@ def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, mo
     cells.make(cell, folder, quiet)
     assert (folder / cells.EPISODES).stat().st_mtime_ns == before
     first = small[0][0]
-    (again,) = cells.episodes(cell.policy(folder / cells.WEIGHTS_FILE), first, range(7000, 7001))
+    (again,) = cells.episodes(cell.policy(folder / cells.WEIGHTS_FILE), first, range(40_000, 40_001))
     assert again == {key: rows[0][key] for key in again}
 
 
@@ -59,7 +59,7 @@ def test_a_folder_has_one_protocol(tmp_path):
     for _ in range(2):
         cells.check_protocol(tmp_path / "new")
     path = tmp_path / "new" / "protocol.toml"
-    path.write_text(path.read_text().replace("first = 7000", "first = 8000"))
+    path.write_text(path.read_text().replace("first = 40_000", "first = 41_000"))
     with pytest.raises(ResultsError, match="was made by another protocol, see .*; remove it, or give another --output"):
         cells.check_protocol(tmp_path / "new")
 
@@ -77,7 +77,7 @@ def test_a_training_that_runs_out_of_time_is_measured_at_its_end(name, tmp_path,
 
 def test_the_time_of_a_field_is_over_that_of_its_own_reference():
     (first,) = TASKS["random_field"].tiers[0]
-    rows = list(cells.episodes("scout", first, range(7000, 7003)))
+    rows = list(cells.episodes("scout", first, range(40_000, 40_003)))
     assert all(1.0 <= float(row["time_ratio"]) < 1.1 for row in rows)
 
 
@@ -115,7 +115,10 @@ def invented(better=(), num=4):
                 for each in task.sets:
                     values = dict.fromkeys(cells.MEASURES, "1") | {"time_ratio": ""}
                     rows += [
-                        place | {"set": each.name, "seed": str(7000 + k)} | values | {"share": f"{gain + maps[k]:.3g}"}
+                        place
+                        | {"set": each.name, "seed": str(40_000 + k)}
+                        | values
+                        | {"share": f"{gain + maps[k]:.3g}"}
                         for k in range(len(maps))
                     ]
                 measured = {"minutes": "1.00", "share": "0.1", "swarm_success": "0", "collisions_per_vehicle": "2"}
