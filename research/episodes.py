@@ -51,7 +51,8 @@ def measured(rows: Iterable[Row], name: str) -> list[float]:
 
 def short(share: float) -> str:
     """Two decimals without a leading zero."""
-    return f"{share:.2f}".replace("0.", ".", 1)
+    rounded = round(share, 2)
+    return "-" * (rounded < 0.0) + f"{abs(rounded):.2f}".removeprefix("0")
 
 
 def succeeded(row: Row) -> bool:
