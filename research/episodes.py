@@ -52,7 +52,7 @@ def measured(rows: Iterable[Row], name: str) -> list[float]:
 def short(share: float) -> str:
     """Two decimals without a leading zero."""
     rounded = round(share, 2)
-    return "-" * (rounded < 0.0) + f"{abs(rounded):.2f}".removeprefix("0")
+    return ("-" if rounded < 0.0 else "") + f"{abs(rounded):.2f}".removeprefix("0")
 
 
 def succeeded(row: Row) -> bool:
