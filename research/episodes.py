@@ -51,8 +51,8 @@ def measured(rows: Iterable[Row], name: str) -> list[float]:
 
 def short(share: float) -> str:
     """Two decimals without a leading zero."""
-    rounded = round(share, 2)
-    return ("-" if rounded < 0.0 else "") + f"{abs(rounded):.2f}".removeprefix("0")
+    digits = f"{abs(share):.2f}".removeprefix("0")
+    return f"-{digits}" if share < 0.0 and digits != ".00" else digits
 
 
 def succeeded(row: Row) -> bool:
