@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from research.episodes import Row, grouped, measured, select
-from research.learners.protocol import LEARNERS, TASKS
+from research.learners.protocol import LEARNERS, MEASURES, TASKS
 from uuv_marl.benchmark.style import panels
 
 
@@ -37,9 +37,9 @@ def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
 
 
 def _draw(ax: Axes, curves: Sequence[Row], column: str, unit: float, colour: str, label: str) -> None:
-    """Mean and range of a learner's trainings."""
-    runs = grouped(curves, "training").values()
-    length = min(map(len, runs))
-    at, share = (np.array([measured(run[:length], each) for run in runs]) for each in (column, "share"))
-    ax.plot(at.mean(axis=0) / unit, share.mean(axis=0), color=colour, label=label)
-    ax.fill_between(at.mean(axis=0) / unit, share.min(axis=0), share.max(axis=0), color=colour, alpha=0.15, linewidth=0)
+    """Mean and range of a learner's trainings, between their measurements where all have some."""
+    runs = [(measured(run, column), measured(run, "share")) for run in grouped(curves, "training").values()]
+    at = np.linspace(max(x[0] for x, _ in runs), min(x[-1] for x, _ in runs), MEASURES)
+    share = np.array([np.interp(at, x, y) for x, y in runs])
+    ax.plot(at / unit, share.mean(axis=0), color=colour, label=label)
+    ax.fill_between(at / unit, share.min(axis=0), share.max(axis=0), color=colour, alpha=0.15, linewidth=0)

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import trim_mean
 
 from uuv_marl.types import Float64
 
@@ -46,16 +45,11 @@ def estimate(values: Float64) -> Estimate:
     return Estimate(float(values[0]), float(low), float(high))
 
 
-def interquartile_mean(scores: Float64) -> Float64:
-    """Mean of the middle half of the trainings and tasks, for scores of shape (resample, training, task)."""
-    return np.asarray(trim_mean(scores.reshape(len(scores), -1), 0.25, axis=1))
-
-
 def improvement(one: Float64, other: Float64, tie: float) -> Float64:
     """Probability that a training of the one scores higher than one of the other, where a tie counts half.
 
     Args:
-        one: scores of shape (resample, training, task).
+        one: main metrics of shape (resample, training, task).
         other: as ``one``.
         tie: difference up to which two scores are equal.
     """
