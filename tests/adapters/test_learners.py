@@ -196,13 +196,17 @@ def test_intervals_are_over_trainings_and_maps():
 def test_a_task_at_the_floor_leaves_the_aggregates():
     curves, rows = invented()
     floored = [
-        {**row, "share": "0.01"} if row["task"] == "silent_targets_easy" and row["learner"] in (*LEARNERS, "random") else row
+        {**row, "share": "0.01"}
+        if row["task"] == "silent_targets_easy" and row["learner"] in (*LEARNERS, "random")
+        else row
         for row in rows
     ]
     every = page.means(page.by_training(floored))
     assert page.compared(every) == [task for task in AGGREGATED if task != "silent_targets_easy"]
     text = page.report(curves, floored)
-    (row,) = [line for line in text.splitlines() if line.startswith("| silent_targets_easy | ") and line.endswith("| no |")]
+    (row,) = [
+        line for line in text.splitlines() if line.startswith("| silent_targets_easy | ") and line.endswith("| no |")
+    ]
     assert row not in page.report(curves, rows)
     others = [task for task in AGGREGATED if task != "silent_targets_easy"]
     for who in LEARNERS:
