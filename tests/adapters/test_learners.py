@@ -29,9 +29,11 @@ def quiet(_):
     pass
 
 
-@pytest.mark.parametrize("name", LEARNERS)
-def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, tmp_path, monkeypatch):
-    task = TASKS["hard_water"]
+@pytest.mark.parametrize(
+    ("name", "on"), [*((name, "hard_water") for name in LEARNERS), ("ISAC", "silent_targets_easy")]
+)  # the last with a channel
+def test_a_cell_is_made_once_and_its_policy_runs_in_every_set(name, on, tmp_path, monkeypatch):
+    task = TASKS[on]
     small = tuple(tuple(each._replace(episodes=range(40_000, 40_001)) for each in tier[:1]) for tier in task.tiers)
     task = task._replace(tiers=small)
     monkeypatch.setattr(cells, "AGENT_STEPS", 45_000)
