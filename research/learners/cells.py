@@ -10,6 +10,7 @@ from typing import NamedTuple
 from research.data import read_text
 from research.episodes import Row, read_rows, write_rows
 from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, PROTOCOL, TASKS, EvaluationSet, Learner, Task
+from research.learners.squashed import squashed
 from research.learners.watch import Report, Trainer, TrainingRequest
 from uuv_marl.atomic import write_text
 from uuv_marl.baselines import with_policy_requirements
@@ -40,8 +41,7 @@ class Cell(NamedTuple):
 
     def policy(self, path: Path) -> str:
         """Name of its policy, by the path of its weights."""
-        path = path.resolve()
-        return f"research.learners.squashed:Squashed,path={path}" if self.learner.trainer == "benchmarl" else str(path)
+        return squashed(path, self.task.channels) if self.learner.trainer == "benchmarl" else str(path.resolve())
 
     @property
     def shipped_weights(self) -> Path:
@@ -61,7 +61,12 @@ def check_protocol(output: Path) -> None:
 
 def cells(tasks: list[str], learners: list[str], trainings: int) -> list[Cell]:
     """All cells of these tasks and learners, the first seed of each first."""
-    chosen = [(TASKS[task], LEARNERS[name]) for task in tasks or TASKS for name in learners or LEARNERS]
+    chosen = [
+        (TASKS[task], LEARNERS[name])
+        for task in tasks or TASKS
+        for name in learners or LEARNERS
+        if name in TASKS[task].learners
+    ]
     return [Cell(task, learner, seed) for seed in range(trainings) for task, learner in chosen]
 
 

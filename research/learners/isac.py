@@ -21,10 +21,11 @@ with warnings.catch_warnings():
     from uuv_marl.envs.benchmarl import SwarmTask
 
 from research.episodes import Row
+from research.learners.protocol import Task
+from research.learners.squashed import squashed
 from research.learners.watch import TrainingRequest, Watch
 from uuv_marl.baselines.learned.checkpoint import WEIGHTS_FILE
 from uuv_marl.train.rows import TRAINING_SEEDS
-from uuv_marl.train.training import overrides_for
 
 REPLAYED = 500_000
 """Size of the replay buffer, in agent-steps."""
@@ -37,20 +38,20 @@ class _SpentError(Exception):
 class _Measured(Callback):
     """Measures the policy when due, and ends the training when the budget is spent."""
 
-    def __init__(self, watch: Watch, folder: Path, vehicles: int) -> None:
+    def __init__(self, watch: Watch, folder: Path, task: Task) -> None:
         super().__init__()
-        self._watch, self._folder, self._vehicles = watch, folder, vehicles
+        self._watch, self._folder, self._task = watch, folder, task
 
     def __getstate__(self) -> dict[str, object]:
         return {}  # BenchMARL pickles callbacks into the experiment's folder
 
     def on_train_end(self, training_td: object, group: str) -> None:  # noqa: ARG002
         """After the updates of an iteration."""
-        steps = self.experiment.total_frames * self._vehicles
+        steps = self.experiment.total_frames * self._task.num_vehicles
         if self._watch.due(steps):
             candidate = self._folder / "candidate.safetensors"
             candidate.write_bytes(safetensors.numpy.save(tensors_of(self.experiment.group_policies[group])))
-            if self._watch.measure(f"research.learners.squashed:Squashed,path={candidate}", steps):
+            if self._watch.measure(squashed(candidate, self._task.channels), steps):
                 candidate.replace(self._folder / WEIGHTS_FILE)
         if self._watch.share(steps) >= 1.0:
             raise _SpentError
@@ -84,11 +85,11 @@ def learn(asked: TrainingRequest) -> list[Row]:
     algorithm = IsacConfig.get_from_yaml()
     algorithm.alpha_init = settings["alpha_init"]
     model = MlpConfig(num_cells=[64, 64], layer_class=torch.nn.Linear, activation_class=torch.nn.Tanh)
-    options = {"observe": "closeness", "num_vehicles": task.num_vehicles, "overrides": overrides_for(task.name, {})}
+    options = {"observe": "closeness", "num_vehicles": task.num_vehicles, "overrides": task.overrides}
     with (folder / "benchmarl.log").open("w") as log, redirect_stderr(log), redirect_stdout(log), suppress(_SpentError):
         Experiment(
             task=getattr(SwarmTask, task.name.upper()).get_task(options), algorithm_config=algorithm,
             model_config=model, critic_model_config=model, seed=TRAINING_SEEDS[0] + 1000 * asked.seed, config=config,
-            callbacks=[_Measured(watch, folder, task.num_vehicles)],
+            callbacks=[_Measured(watch, folder, task)],
         ).run()  # fmt: skip
     return watch.curve

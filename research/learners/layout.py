@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from research.episodes import Row, grouped, measured
-from research.learners.protocol import AGENT_STEPS, LEARNERS, MEASURES, TASKS
+from research.learners.protocol import AGENT_STEPS, AGGREGATED, LEARNERS, MEASURES, TASKS
 
 ENVIRONMENT = "uuv_marl"
 _METRICS = ("share", "swarm_success", "collisions_per_vehicle")
@@ -16,13 +16,15 @@ def marl_eval(curves: Sequence[Row], rows: Sequence[Row]) -> dict[str, Any]:
 
     A step also has ``step_count``. Marl-eval draws all runs with one interval between steps, so for every run the steps
     are the tenths of the budget in agent-steps. Each has the measure nearest to it: a training that time ended sooner
-    stays at its last one. The absolute metrics are those of the best policy in the final episodes.
+    stays at its last one. The absolute metrics are those of the best policy in the final episodes. Marl-eval needs all
+    algorithms on all tasks, so the challenge is left out.
     """
-    layout: dict[str, dict[str, dict[str, Any]]] = {task: {name: {} for name in LEARNERS} for task in TASKS}
+    layout: dict[str, dict[str, dict[str, Any]]] = {task: {learner: {} for learner in LEARNERS} for task in AGGREGATED}
+    curves = [row for row in curves if row["task"] in AGGREGATED]
     for (task, learner, training), run in grouped(curves, "task", "learner", "training").items():
         layout[task][learner][f"seed_{training}"] = {f"step_{k}": _at(step, run) for k, step in enumerate(_STEPS)}
-    first = {task: each.tiers[0][0].name for task, each in TASKS.items()}
-    final = [row for row in rows if row["training"] and row["set"] == first[row["task"]]]
+    first = {task: TASKS[task].tiers[0][0].name for task in AGGREGATED}
+    final = [row for row in rows if row["training"] and row["set"] == first.get(row["task"])]
     for (task, learner, training), mine in grouped(final, "task", "learner", "training").items():
         layout[task][learner][f"seed_{training}"]["absolute_metrics"] = _means(mine)
     return {ENVIRONMENT: layout}

@@ -11,10 +11,10 @@ import numpy as np
 
 from research.data import read_text
 from research.episodes import Row, grouped, measured, short, write_rows
-from research.learners.figures import draw_curves, draw_profiles
+from research.learners.figures import draw_curves
 from research.learners.layout import marl_eval
-from research.learners.protocol import AGENT_STEPS, LEARNERS, MINUTES, TASKS, TRAININGS
-from research.learners.statistics import Estimate, improvement, interquartile_mean, mean
+from research.learners.protocol import AGENT_STEPS, AGGREGATED, FLOOR, LEARNERS, MINUTES, TASKS, TIE, TRAININGS
+from research.learners.statistics import Estimate, estimate, improvement, resampled
 from research.tasks.page import named
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.style import house_style
@@ -22,34 +22,34 @@ from uuv_marl.benchmark.tables import markdown_table
 from uuv_marl.types import Float64
 
 _ENOUGH = 4
-"""Fewest trainings for a comparison. With three, a fifth of equal pairs differ significantly, with four or five a
-twelfth (3,000 simulated)."""
+"""Fewest trainings for a comparison. Of pairs of equal learners .19 would differ significantly with three trainings,
+.14 with four, .12 with five, .08 with ten."""
 _FEW = 100
 """Fewest episodes for a mean."""
+_CELLS = sum(len(task.learners) for task in TASKS.values())
+"""Trainings with the same seed."""
 Groups = Mapping[tuple[str, ...], Sequence[Row]]
 """Rows by task, learner or policy, training, and set."""
+Means = Mapping[tuple[str, str], Float64]
+"""Of each task and competitor, the means that ``statistics.resampled`` gives, shape (1 + resample, training)."""
 
 
 def write_page(folder: Path, curves: Sequence[Row], rows: Sequence[Row]) -> list[Path]:
-    """Write the page, its pictures and its files; return the paths."""
+    """Write the page, its picture and its files; return the paths."""
     write_rows(folder / "learners.csv.gz", rows)
     write_rows(folder / "learners_curves.csv.gz", curves)
-    write_text(folder / "learners_marl_eval.json", json.dumps(marl_eval(curves, rows)) + "\n")
+    write_text(folder / "learners_marl_eval.json", json.dumps(marl_eval(*complete(curves, rows))) + "\n")
     write_text(folder / "learners.md", report(curves, rows))
-    shown, pictures = complete(curves, rows), folder / "figures"
     with house_style():
-        drawn = [
-            draw_curves(*shown, pictures / "learners_curves.png"),
-            draw_profiles(against_controller(by_training(shown[1])), pictures / "learners_profiles.png"),
-        ]
+        drawn = draw_curves(*complete(curves, rows), folder / "figures" / "learners_curves.png")
     names = ("learners.md", "learners.csv.gz", "learners_curves.csv.gz", "learners_marl_eval.json")
-    return [*(folder / name for name in names), *drawn]
+    return [*(folder / name for name in names), drawn]
 
 
 def complete(curves: Sequence[Row], rows: Sequence[Row]) -> tuple[list[Row], list[Row]]:
     """Curves and rows of the trainings that all learners have on all tasks, and rows of other policies."""
     num = Counter(training for *_, training in grouped(curves, "task", "learner", "training"))
-    shown = {"", *(training for training, learned in num.items() if learned == len(TASKS) * len(LEARNERS))}
+    shown = {"", *(training for training, learned in num.items() if learned == _CELLS)}
     return [row for row in curves if row["training"] in shown], [row for row in rows if row["training"] in shown]
 
 
@@ -57,10 +57,13 @@ def report(curves: Sequence[Row], rows: Sequence[Row]) -> str:
     """The page's text, from ``complete`` trainings."""
     curves, rows = complete(curves, rows)
     groups, num_trainings = by_training(rows), len(grouped(curves, "task", "learner", "training"))
-    wanted = len(TASKS) * len(LEARNERS) * TRAININGS
+    every, wanted = means(groups), _CELLS * TRAININGS
     partial = f" so far (of {wanted})" * (num_trainings < wanted)
+    unseen, *others = (len(each.episodes) for each in next(iter(TASKS.values())).sets)
     return Template(read_text("learners", "story.md")).substitute(
-        first=_first(groups), tiers=_tiers(groups), safety=_safety(groups), pairs=_pairs(groups), apart=_apart(groups),
+        unseen=unseen, other=others[0],
+        first=_first(groups, every), separation=_separation(every), challenge=_challenge(groups, every),
+        tiers=_tiers(groups), safety=_safety(groups), pairs=_pairs(every), apart=_apart(every),
         compute=_compute(curves), settings=_settings(), episodes=f"{len(rows):,}", steps=f"{AGENT_STEPS / 1e6:g}",
         minutes=f"{MINUTES:g}", trainings=f"{num_trainings} trainings" + partial,
     )  # fmt: skip
@@ -71,26 +74,47 @@ def by_training(rows: Sequence[Row]) -> Groups:
     return grouped(rows, "task", "learner", "training", "set")
 
 
-def scores(groups: Groups) -> dict[str, Float64]:
-    """The headline of each learner's trainings on unseen seeds, shape (training, task)."""
-    return {
-        competitor: np.concatenate([_values(groups, task, competitor) for task in TASKS], axis=1)
-        for competitor in LEARNERS
-    }
+def means(groups: Groups) -> Means:
+    """The headline of all trainings and policies on unseen seeds, resampled over trainings and maps."""
+    found: dict[tuple[str, str], Float64] = {}
+    for k, task in enumerate(TASKS):
+        competitors = _competitors(groups, task)
+        scores = [np.array([_by_seed(rows) for rows in _of(groups, task, one)]) for one in competitors]
+        for one, values in zip(competitors, resampled(scores, seed=k), strict=True):
+            found[task, one] = values
+    return found
 
 
-def ranked(groups: Groups) -> dict[str, Float64]:
-    """``scores`` in two digits, so that smaller differences are ties."""
-    return {competitor: every.round(2) for competitor, every in scores(groups).items()}
+def _by_seed(rows: Sequence[Row]) -> list[float]:
+    return measured(sorted(rows, key=lambda row: int(row["seed"])), "share")
 
 
-def against_controller(groups: Groups) -> dict[str, Float64]:
-    """The headline over the best controller's, both above that of ``random``."""
-    controller, least = (
-        np.array([_values(groups, name, policy or task.policies[0]).mean() for name, task in TASKS.items()])
-        for policy in ("", "random")
-    )
-    return {competitor: (every - least) / (controller - least) for competitor, every in scores(groups).items()}
+def against_controller(every: Means, task: str, learner: str) -> Float64:
+    """The headline of a learner's trainings over the best controller's, both above that of ``random``."""
+    least, controller = every[task, "random"], every[task, TASKS[task].policies[0]]
+    return (every[task, learner] - least) / (controller - least)
+
+
+def compared(every: Means) -> list[str]:
+    """The tasks of the aggregates: not those at the floor."""
+    return [task for task in AGGREGATED if _best(every, task)[1] >= FLOOR]
+
+
+def _best(every: Means, task: str) -> tuple[str, float]:
+    """The learner with the best mean on a task, and its mean over the best controller's."""
+    found = {learner: float(against_controller(every, task, learner)[0].mean()) for learner in LEARNERS}
+    best = max(found, key=lambda learner: found[learner])
+    return best, found[best]
+
+
+def _overall(every: Means, learner: str) -> Float64:
+    """Scores over the best controller's, mean over trainings and tasks, shape (1 + resample,)."""
+    return np.mean([against_controller(every, task, learner).mean(axis=1) for task in compared(every)], axis=0)
+
+
+def _stacked(every: Means, learner: str) -> Float64:
+    """The headline on the tasks of the aggregates, shape (1 + resample, training, task)."""
+    return np.stack([every[task, learner] for task in compared(every)], axis=-1)
 
 
 def _values(groups: Groups, task: str, competitor: str, name: str = "share", each: str = "") -> Float64:
@@ -108,36 +132,54 @@ def _mean(rows: Sequence[Row], name: str) -> float:
     return float(np.mean(values)) if values else float("nan")
 
 
-def _with_interval(estimate: Estimate) -> str:
-    return f"{short(estimate.point)} [{short(estimate.low)}, {short(estimate.high)}]"
+def _with_interval(found: Estimate) -> str:
+    return f"{short(found.point)} [{short(found.low)}, {short(found.high)}]"
 
 
-def _over_episodes(rows: Sequence[Row]) -> Estimate:
-    """The mean headline of episodes, with a 95 % interval."""
-    values = measured(rows, "share")
-    point, half = float(np.mean(values)), 1.96 * float(np.std(values)) / len(values) ** 0.5
-    return Estimate(point, max(point - half, 0.0), min(point + half, 1.0))
+def _cell(groups: Groups, every: Means, task: str, one: str) -> str:
+    """Headline with its interval, and swarm success."""
+    if (task, one) not in every:
+        return "–"
+    success = float(_values(groups, task, one, "swarm_success").mean())
+    return f"{_with_interval(estimate(every[task, one].mean(axis=1)))}, {short(success)}"
 
 
-def _first(groups: Groups) -> str:
+def _first(groups: Groups, every: Means) -> str:
     """Headline and swarm success on unseen seeds, a column for each task, then all tasks."""
-    every, table = against_controller(groups), list[tuple[str, ...]]()
-    for competitor, own in scores(groups).items():
-        shares = [_values(groups, task, competitor, "swarm_success").mean() for task in TASKS]
-        cells = [f"{_with_interval(mean(own[:, k : k + 1]))}, {short(float(share))}" for k, share in enumerate(shares)]
-        overall = [_with_interval(statistic(every[competitor])) for statistic in (interquartile_mean, mean)]
-        table.append((competitor, *cells, *overall))
+    table = list[tuple[str, ...]]()
+    for learner in LEARNERS:
+        cells = (_cell(groups, every, task, learner) for task in AGGREGATED)
+        table.append((learner, *cells, _with_interval(estimate(_overall(every, learner)))))
     for words in ("best controller", "oracle", "random"):
-        policies = [task.policies[0] if words == "best controller" else words for task in TASKS.values()]
-        rows = [groups.get((task, policy, "", task)) for task, policy in zip(TASKS, policies, strict=True)]
-        cells = [f"{_with_interval(_over_episodes(r))}, {short(_mean(r, 'swarm_success'))}" if r else "–" for r in rows]
-        table.append((words, *cells, "", ""))
-    return markdown_table(("", *TASKS, "all, IQM", "all, mean"), table)
+        ones = ((task, TASKS[task].policies[0] if words == "best controller" else words) for task in AGGREGATED)
+        table.append((words, *(_cell(groups, every, *one) for one in ones), ""))
+    return markdown_table(("", *AGGREGATED, "mean score"), table)
+
+
+def _separation(every: Means) -> str:
+    """Whether a task separates the learners: the best one against the controller, and the spread of the means."""
+    table: list[tuple[str, ...]] = []
+    for task in AGGREGATED:
+        own = [float(every[task, learner][0].mean()) for learner in LEARNERS]
+        best, share = _best(every, task)
+        table.append((task, best, short(share), short(max(own) - min(own)), "yes" if task in compared(every) else "no"))
+    return markdown_table(("task", "best learner", "its score", "spread", "in the mean score"), table)
+
+
+def _challenge(groups: Groups, every: Means) -> str:
+    """The tasks that are in no aggregate."""
+    tables: list[str] = []
+    for task in (name for name in TASKS if name not in AGGREGATED):
+        rows = [(_called(one), _cell(groups, every, task, one)) for one in _competitors(groups, task)]
+        tables.append(markdown_table(("", task), rows))
+    return "\n".join(tables)
 
 
 def _competitors(groups: Groups, task: str) -> list[str]:
     """Learners, then policies."""
-    return list(dict.fromkeys([*LEARNERS, *(competitor for where, competitor, *_ in groups if where == task)]))
+    return list(
+        dict.fromkeys([*TASKS[task].learners, *(competitor for where, competitor, *_ in groups if where == task)])
+    )
 
 
 def _called(competitor: str) -> str:
@@ -167,49 +209,69 @@ def _safety(groups: Groups) -> str:
     table: list[tuple[str, ...]] = []
     for task in TASKS:
         for competitor in _competitors(groups, task):
+            rows = [row for own in _of(groups, task, competitor) for row in own]
+            found = {name: measured(rows, name) for name in formats}
             cells = [
-                spec.format(float(np.nanmean(_values(groups, task, competitor, name))))
-                if sum(len(measured(rows, name)) for rows in _of(groups, task, competitor)) >= _FEW else "–"
-                for name, spec in formats.items()
-            ]  # fmt: skip
+                formats[name].format(float(np.mean(values))) if len(values) >= _FEW else "–"
+                for name, values in found.items()
+            ]
             table.append((task, _called(competitor), *cells))
     return markdown_table(("task", "", "collisions", "obstacle distance", "spacing", "time ratio"), table)
 
 
-def _pairs(groups: Groups) -> str:
-    """Probability of improvement over all tasks."""
-    every = ranked(groups)
-    table = [(f"{one} over {other}", _with_interval(improvement(every[one], every[other])))
-             for one, other in combinations(LEARNERS, 2)]  # fmt: skip
+def _pairs(every: Means) -> str:
+    """Probability of improvement over the tasks of the aggregates."""
+    if _few(every):
+        return ""
+    table = [
+        (
+            f"{one} over {other}",
+            _with_interval(estimate(improvement(_stacked(every, one), _stacked(every, other), TIE))),
+        )
+        for one, other in combinations(LEARNERS, 2)
+    ]
     return markdown_table(("", "probability"), table)
 
 
-def _apart(groups: Groups) -> str:
-    """Pairs that differ significantly on each task: the interval excludes one half."""
-    every, table = ranked(groups), list[tuple[str, ...]]()
-    if (num := min(map(len, every.values()))) < _ENOUGH:
+def _few(every: Means) -> int:
+    """Number of trainings of each learner, if too few for a comparison; else 0."""
+    num = min(values.shape[1] for (_, one), values in every.items() if one in LEARNERS)
+    return num * (num < _ENOUGH)
+
+
+def _apart(every: Means) -> str:
+    """Pairs that differ significantly on each task, and those that are equivalent."""
+    if num := _few(every):
         return f"Each learner has {num} of {TRAININGS} trainings so far, too few for a comparison.\n"
-    for k, task in enumerate(TASKS):
-        apart: list[str] = []
-        for one, other in combinations(LEARNERS, 2):
-            estimate = improvement(every[one][:, k : k + 1], every[other][:, k : k + 1])
-            if estimate.low > 0.5 or estimate.high < 0.5:
-                apart.append(f"{one} over {other}" if estimate.low > 0.5 else f"{other} over {one}")
-        table.append((task, str(len(apart)), ", ".join(apart) or "–"))
-    return markdown_table(("task", "pairs", "significantly different"), table)
+    table: list[tuple[str, ...]] = []
+    for task in compared(every):
+        apart, alike = list[str](), list[str]()
+        for pair in combinations(LEARNERS, 2):
+            one, other = (every[task, learner].mean(axis=1) for learner in pair)
+            found = estimate(one - other)
+            if found.low > 0.0 or found.high < 0.0:
+                apart.append(" over ".join(pair if found.low > 0.0 else pair[::-1]))
+            if found.low >= -TIE and found.high <= TIE:
+                alike.append(" and ".join(pair))
+        table.append((task, str(len(apart)), ", ".join(apart) or "–", ", ".join(alike) or "–"))
+    return markdown_table(("task", "pairs", "significantly different", "equivalent"), table)
 
 
 def _compute(curves: Sequence[Row]) -> str:
-    """Mean agent-steps and processor time of a training."""
+    """Mean agent-steps, decisions of a world and processor time of a training."""
     table: list[tuple[str, ...]] = []
     for competitor in LEARNERS:
         cells: list[str] = []
         for task in TASKS:
+            if competitor not in TASKS[task].learners:
+                cells.append("–")
+                continue
             last = {
                 row["training"]: row for row in curves if (row["task"], row["learner"]) == (task, competitor)
             }.values()
             steps, minutes = (float(np.mean(measured(last, name))) for name in ("agent_steps", "minutes"))
-            cells.append(f"{steps / 1e6:.1f} M, {minutes:.1f} min")
+            worlds = steps / TASKS[task].num_vehicles
+            cells.append(f"{steps / 1e6:.1f} M, {worlds / 1e6:.2f} M, {minutes:.1f} min")
         table.append((competitor, *cells))
     return markdown_table(("", *TASKS), table)
 

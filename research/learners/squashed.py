@@ -1,5 +1,7 @@
 """``Squashed``: a policy whose layers end in tanh, as those of SAC do, from a file of its weights."""
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,16 +17,31 @@ from uuv_marl.sim.observation import observation_layout, observer
 from uuv_marl.types import Float32
 
 
+def squashed(path: Path, channels: Sequence[str]) -> str:
+    """Name of the policy with the weights of a file, which was trained with these channels."""
+    return f"{__name__}:Squashed,path={path.resolve()}" + "".join(f",{channel}=true" for channel in channels)
+
+
 class Squashed(Policy):
     """Layers of tanh units; the first half of the last one's outputs, through tanh, is the action.
 
     Args:
         path: of the weights ``0.weight`` (in, out), ``0.bias`` and so on.
+        identity: whether they read this channel, too.
     """
 
-    requirements = PolicyRequirements(yaw_damping_nms=600.0, decision_period_s=0.5, outputs_force=True)
+    requirements = PolicyRequirements(
+        yaw_damping_nms=600.0, decision_period_s=0.5, outputs_force=True, channels_if={"identity": ("identity",)}
+    )
 
-    def __init__(self, scenario: Scenario, num_worlds: int = 1, *, path: str) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        num_worlds: int = 1,
+        *,
+        path: str,
+        identity: bool = False,  # noqa: ARG002
+    ) -> None:
         super().__init__(scenario, num_worlds)
         self._tensors: dict[str, Any] = safetensors.numpy.load(user_path(path).read_bytes())
         self._seeing = observation_layout(scenario, "closeness")

@@ -1,72 +1,57 @@
-"""Rliable's estimates (Agarwal et al. 2021), with types, and the same numbers every time."""
+"""Bootstrap over trainings and maps: every mean is resampled together, so that differences keep what they share."""
 
-# pyright: reportMissingImports=false, reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false, reportUnknownLambdaType=false
-# It lives in the environment of ``make test-benchmarl``.
-
-from collections.abc import Callable, Generator, Mapping
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from rliable.library import create_performance_profile, get_interval_estimates
-from rliable.metrics import aggregate_iqm, aggregate_mean, probability_of_improvement
 
 from uuv_marl.types import Float64
 
-_RESAMPLES, _OF_PAIRS, _OF_PROFILES = 2000, 500, 1000
+RESAMPLES = 2000
 
 
 class Estimate(NamedTuple):
-    """A number and its 95 % interval, by a bootstrap over trainings, stratified by task."""
+    """A number and its 95 % interval."""
 
     point: float
     low: float
     high: float
 
 
-def mean(scores: Float64) -> Estimate:
-    """Over trainings and tasks, ``scores`` (training, task)."""
-    return _aggregated(scores, aggregate_mean)
+def resampled(scores: Sequence[Float64], seed: int) -> list[Float64]:
+    """Means of trainings over the episodes of a task, in resamples of both.
+
+    Args:
+        scores: of each competitor, shape (training, episode); all ran the same episodes.
+        seed: of the resamples.
+
+    Returns:
+        For each competitor the means of its trainings, shape (1 + resample, training): the first row without
+        resampling. Episodes are drawn once for all competitors, trainings for each.
+    """
+    rng, num = np.random.default_rng(seed), scores[0].shape[1]
+    weights = np.concatenate([np.ones((1, num)), rng.multinomial(num, np.full(num, 1.0 / num), RESAMPLES)]) / num
+    found: list[Float64] = []
+    for own in scores:
+        size = len(own)
+        drawn = np.concatenate([np.arange(size)[None], rng.integers(size, size=(RESAMPLES, size))])
+        found.append(np.take_along_axis(weights @ own.T, drawn, axis=1))
+    return found
 
 
-def interquartile_mean(scores: Float64) -> Estimate:
-    """The same of the middle half of the scores."""
-    return _aggregated(scores, aggregate_iqm)
+def estimate(values: Float64) -> Estimate:
+    """The first value, and the interval of the others."""
+    low, high = np.quantile(values[1:], (0.025, 0.975))
+    return Estimate(float(values[0]), float(low), float(high))
 
 
-def _aggregated(scores: Float64, aggregate: Callable[[Float64], float]) -> Estimate:
-    with _seeded():
-        return _estimate(*get_interval_estimates({"": scores}, lambda x: np.array([aggregate(x)]), reps=_RESAMPLES))
+def improvement(one: Float64, other: Float64, tie: float) -> Float64:
+    """Probability that a training of the one scores higher than one of the other, where a tie counts half.
 
-
-def improvement(one: Float64, other: Float64) -> Estimate:
-    """Probability that a training of the one scores higher than one of the other; both (training, task)."""
-    with _seeded():
-        return _estimate(
-            *get_interval_estimates(
-                {"": [one, other]}, lambda x, y: np.array([probability_of_improvement(x, y)]), reps=_OF_PAIRS
-            )
-        )
-
-
-def profiles(scores: Mapping[str, Float64], levels: Float64) -> dict[str, Float64]:
-    """Share of the scores (training, task) above each level, and its interval: shape (3, level), by learner."""
-    with _seeded():
-        profile, ends = create_performance_profile(dict(scores), levels, reps=_OF_PROFILES)
-    return {name: np.stack([profile[name], *ends[name]]) for name in scores}
-
-
-def _estimate(points: Mapping[str, Float64], ends: Mapping[str, Float64]) -> Estimate:
-    return Estimate(float(points[""][0]), float(ends[""][0, 0]), float(ends[""][1, 0]))
-
-
-@contextmanager
-def _seeded() -> Generator[None]:
-    """Rliable draws from NumPy's global generator, which is as before afterwards."""
-    before = np.random.get_state()  # noqa: NPY002
-    np.random.seed(0)  # noqa: NPY002
-    try:
-        yield
-    finally:
-        np.random.set_state(before)  # noqa: NPY002
+    Args:
+        one: main metrics of shape (resample, training, task).
+        other: as ``one``.
+        tie: difference up to which two scores are equal.
+    """
+    gap = one[:, :, None] - other[:, None]
+    return ((gap > tie) + 0.5 * (np.abs(gap) <= tie)).mean(axis=(1, 2, 3))
