@@ -10,21 +10,19 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from research.episodes import Row, grouped, measured, select
-from research.learners.protocol import LEARNERS, MEASURES, TASKS
+from research.learners.protocol import AGGREGATED, LEARNERS, MEASURES, TASKS
 from uuv_marl.benchmark.style import panels
 
 
 def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
     """Headline on validation over agent-steps, and over minutes: mean and range of the trainings, and controller."""
-    figure, axes = panels(2 * len(TASKS), len(TASKS), (2.6, 2.4))
+    figure, axes = panels(2 * len(AGGREGATED), len(AGGREGATED), (2.8, 2.4))
     names = (("agent_steps", 1e6, "million agent-steps"), ("minutes", 1.0, "minutes"))
-    for k, (name, task) in enumerate(TASKS.items()):
-        controller = [row for row in rows if (row["learner"], row["set"]) == (task.policies[0], task.tiers[0][0].name)]
+    for k, name in enumerate(AGGREGATED):
+        controller = [row for row in rows if (row["learner"], row["set"]) == (TASKS[name].policies[0], name)]
         for row, (column, unit, words) in enumerate(names):
-            ax = axes[row * len(TASKS) + k]
+            ax = axes[row * len(AGGREGATED) + k]
             for colour, learner in enumerate(LEARNERS):
-                if learner not in task.learners:
-                    continue
                 _draw(ax, select(curves, task=name, learner=learner), column, unit, f"C{colour}", learner)
             ax.axhline(
                 float(np.mean(measured(controller, "share"))), color="0.4", linestyle="--", label="best controller"

@@ -319,7 +319,10 @@ def test_learners_differ_on_the_tasks_that_the_page_names(found):
         assert np.ptp([found.mean(task, who) for who in FOUR]) < 0.05
     assert all(found.better(task, who, "ISAC") for task in AGGREGATED for who in FOUR)
     for task in ("random_field", "hard_water"):
-        assert all(found.during(task, "ISAC", 0.3, 0.6) > found.during(task, who, 0.3, 0.6) for who in THREE)
+        assert all(found.during(task, "ISAC", 0.3, 0.6) > found.during(task, who, 0.3, 0.6) for who in FOUR)
+    ends = {(row["task"], row["learner"], row["training"]): float(row["agent_steps"]) / 1e6 for row in found.curves}
+    for name, least, most in (("MAPPO-GRU", 2.2, 3.6), ("ISAC", 0.3, 0.5), ("MAPPO", 5.0, 5.1)):
+        assert all(least <= end <= most for (_, who, _), end in ends.items() if who == name)
 
 
 def test_disturbances_cost_what_the_page_says(found):
