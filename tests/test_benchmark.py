@@ -164,7 +164,6 @@ def test_the_parameters_listed_are_those_that_a_policy_s_name_takes(name):
     (["train", "nowhere"], "scenario 'nowhere'"),
     (["train", "nowhere.toml"], "nowhere.toml can't be read"),
     (["train", "starter", "--seed=1", "--set=seed=2"], "--set seed is given twice, as 1 and as 2; leave one out"),
-    (["robustness", "--scenario=hard_water"], "has the task 'hard_water', and the suite scores 'follow' alone"),
     (["robustness", "--axis=X", "--level=2"], "axis X has the levels 1, "),
     (["tune", "--policy=idle"], "no free gains"),
 ])  # fmt: skip

@@ -9,7 +9,7 @@ from tests.processes import ROOT, succeeds
 from uuv_marl import load_scenario
 from uuv_marl.benchmark.evaluate import episodes
 from uuv_marl.benchmark.robustness import job, page, scores
-from uuv_marl.benchmark.robustness.axes import AXES, BASE, CALM, GROUPS, overrides
+from uuv_marl.benchmark.robustness.axes import AXES, CALM, GROUPS, overrides
 from uuv_marl.benchmark.success import GRACE_S
 from uuv_marl.scenario import disturbances
 
@@ -38,7 +38,7 @@ def test_every_axis_is_whole():
 
 @pytest.mark.parametrize("scenario", ["single_obstacle", "random_field", "tracking"])
 def test_every_level_is_a_scenario_of_its_own(scenario):
-    seen = [load_scenario(scenario, overrides=BASE)]
+    seen = [load_scenario(scenario, overrides=overrides(CALM, 0, scenario))]
     assert disturbances(seen[0]) == []
     limit = seen[0].time_limit
     assert (limit.factor, limit.extra_s, seen[0].arrival.ends_episode) == (1.0, GRACE_S, False)
@@ -114,6 +114,18 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
     assert kept["runs"][0]["metrics"]["success_share"] == pytest.approx(rows["success_share"][2])
     before = [path.read_bytes() for path in page.write_robustness_report(tmp_path)]
     assert before == [path.read_bytes() for path in page.write_robustness_report(tmp_path)]
+
+
+def test_other_tasks_are_scored_by_their_main_metric_within_their_own_time(tmp_path):
+    plan = job.Plan(("W4", "F4"), (3,), ("silent_targets_easy", "starter"), ("idle",), 1)
+    rows = job.read_episodes(job.run(tmp_path, plan, silent)).set_index(["scenario", "axis"])
+    assert [*rows.loc["silent_targets_easy"].index] == [CALM, "F4"], "its obstacles can't be made to move"
+    assert [*rows.loc["starter"].index] == [CALM, "W4", "F4"]
+    success = scores.by_seed(rows.reset_index())
+    for scenario, name in (("silent_targets_easy", "held_share"), ("starter", "success_share")):
+        assert success.loc[(scenario, "idle", 0), (CALM, 0)] == rows.loc[(scenario, CALM), name]
+    alone = load_scenario("silent_targets_easy")
+    assert load_scenario("silent_targets_easy", overrides=overrides(CALM, 0, "silent_targets_easy")) == alone
 
 
 @pytest.mark.docs

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 from uuv_marl.baselines.making import policy_requirements
 from uuv_marl.errors import ResultsError
-from uuv_marl.scenario import load_scenario
+from uuv_marl.scenario import Scenario, load_scenario
+from uuv_marl.tasks import Follow
 
 GROUPS = {
     "W": "water", "S": "sonar", "N": "navigation", "C": "communication", "A": "actuators", "F": "faults",
@@ -42,9 +43,11 @@ class Axis(NamedTuple):
         changes = self.changes[self.levels.index(level)]
         return {f: speed_mps * v if f in self.of_speed else v for f, v in changes.items()}
 
-    def concerns(self, policy: str) -> bool:
-        """Whether the policy uses the disturbed channels."""
-        return not self.channels or not self.channels.isdisjoint(policy_requirements(policy).channels)
+    def concerns(self, policy: str, scenario: Scenario) -> bool:
+        """Whether the policy uses the disturbed channels, and obstacles of the scenario's task can move if they must."""
+        moves = any(field.startswith("traffic.") for field in self.changes[0])
+        used = not self.channels or not self.channels.isdisjoint(policy_requirements(policy).channels)
+        return used and (scenario.task_class.traffic or not moves)
 
 
 def _axis(name: str, data: dict[str, Any]) -> Axis:
@@ -64,15 +67,16 @@ def _axis(name: str, data: dict[str, Any]) -> Axis:
 
 _DATA = tomllib.loads((resources.files("uuv_marl.benchmark.robustness") / "axes.toml").read_text(encoding="utf-8"))
 BASE: dict[str, Any] = _DATA["base"]
-"""Changed fields of every scenario of the suite, also at level 0."""
+"""Changed fields of scenarios with the task ``follow``, also at level 0; others have none."""
 AXES = {name: _axis(name, data) for name, data in _DATA["axes"].items()}
 """All axes by name, in the order of the report."""
 
 
 def overrides(axis: str, level: int, scenario: str) -> dict[str, object]:
     """Changed fields of a scenario in a cell of the suite."""
-    speed_mps = load_scenario(scenario).trajectory.speed_mps
-    return BASE | ({} if axis == CALM else AXES[axis].overrides(level, speed_mps))
+    loaded = load_scenario(scenario)
+    base = BASE if issubclass(loaded.task_class, Follow) else {}
+    return base | ({} if axis == CALM else AXES[axis].overrides(level, loaded.trajectory.speed_mps))
 
 
 def known(names: Sequence[str]) -> list[str]:

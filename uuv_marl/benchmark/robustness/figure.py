@@ -39,7 +39,7 @@ def draw(table: Any) -> Figure:
         ax.set_ylim(-0.04, 1.04)
     for ax in fields[len(axes) :]:
         ax.set_axis_off()
-    figure.supylabel("success: share of the healthy\nvehicles that are safe and done")
+    figure.supylabel("success")
     where = ", ".join(table.index.unique("scenario"))
     what = "mean over seeds" + " and its 95 % bootstrap interval" * intervals
     figure.suptitle(f"Success over severity on {where}:\n{what}")

@@ -11,14 +11,13 @@ from uuv_marl.benchmark.robustness.axes import AXES, CALM, overrides
 from uuv_marl.benchmark.runner import distinct_names
 from uuv_marl.benchmark.suite import Case, Report, Suite
 from uuv_marl.scenario import ScenarioError, load_scenario
-from uuv_marl.tasks import Follow
 
 EPISODES = "episodes.csv"
 METRICS = (
     "success_share", "safe_share", "done_share", "swarm_success", "vehicles_faulty", "collisions",
     "min_obstacle_distance_m", "min_spacing_m", "centre_error_m", "task_time_s", "effort",
 )  # fmt: skip
-"""Metrics of an episode that are kept; docs/benchmark.md defines them."""
+"""Metrics of an episode that are kept, besides the tasks' main ones; docs/benchmark.md defines them."""
 DIGITS = ".6g"
 
 
@@ -54,7 +53,7 @@ def cells(plan: Plan) -> list[tuple[str, int, Case]]:
         for scenario in plan.scenarios
         for axis, level in [(CALM, 0), *places]
         for policy in plan.policies
-        if axis == CALM or AXES[axis].concerns(policy)
+        if axis == CALM or AXES[axis].concerns(policy, load_scenario(scenario))
     ]  # fmt: skip
 
 
@@ -71,17 +70,11 @@ def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> P
 
     Raises:
         PolicyError: a policy does not exist, or cannot be run on one of the scenarios.
-        ScenarioError: two scenarios have the same name, or one has another task than ``follow``.
+        ScenarioError: two scenarios have the same name, or an axis has none of the levels.
         ResultsError: the folder holds other results.
     """
     scenarios = [load_scenario(scenario) for scenario in plan.scenarios]
     distinct_names(scenarios, "report")
-    for scenario in scenarios:
-        if not issubclass(scenario.task_class, Follow):
-            raise ScenarioError(
-                f"scenario {scenario.name!r} has the task {scenario.task.name!r}, and the suite scores 'follow' alone; "
-                "choose another scenario"
-            )
     for axis in plan.axes:
         if not {*plan.levels} & {*AXES[axis].levels}:
             levels = ", ".join(map(str, AXES[axis].levels))
@@ -92,18 +85,19 @@ def run(folder: Path, plan: Plan, report: Report, *, restart: bool = False) -> P
     suite = Suite(folder / "cells", traces=False)
     suite.run([case for _, _, case in planned], report, restart=restart)
     path = folder / EPISODES
-    rows = [row for cell in planned for row in _rows(suite, *cell)]
+    names = list(dict.fromkeys((*METRICS, *(scenario.task_class.headline for scenario in scenarios))))
+    rows = [row for cell in planned for row in _rows(suite, names, *cell)]
     with replacing(path) as partial:
         frame = import_pandas("uuv-marl robustness").DataFrame.from_records(rows)
         frame.to_csv(partial, index=False, float_format=f"%{DIGITS}")
     return path
 
 
-def _rows(suite: Suite, axis: str, level: int, case: Case) -> Iterator[dict[str, Any]]:
+def _rows(suite: Suite, names: Sequence[str], axis: str, level: int, case: Case) -> Iterator[dict[str, Any]]:
     for row in suite.results(case).select(case.load().name, case.policy, suite.seeds_of(case)):
-        metrics: dict[str, Any] = dict(row.metrics)
+        metrics: dict[str, Any] = {**row.metrics, **row.metrics.get("task", {})}
         place = {"scenario": row.scenario, "axis": axis, "level": level, "policy": row.policy}
-        yield {**place, "seed": row.seed, **{name: metrics[name] for name in METRICS}}
+        yield {**place, "seed": row.seed, **{name: metrics.get(name) for name in names}}
 
 
 def read_episodes(path: Path) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.estimates import Estimate
-from uuv_marl.benchmark.robustness.axes import AXES, BASE, CALM, GROUPS
+from uuv_marl.benchmark.robustness.axes import AXES, BASE, CALM, GROUPS, overrides
 from uuv_marl.benchmark.robustness.figure import draw
 from uuv_marl.benchmark.robustness.job import EPISODES, read_episodes
 from uuv_marl.benchmark.robustness.scores import EVERY, axis_score, by_seed, group_score, scored
@@ -35,8 +35,8 @@ def report(episodes: Any) -> str:
     names = [name for name, _ in scenarios]
     return Template((folder / "story.md").read_text(encoding="utf-8")).substitute(
         headline=f"{len(episodes):,} episodes on {', '.join(f'`{name}`' for name in names)}",
-        conditions=f"{_calm(names)}; echoes report the {BASE['sonar.echo_reports']} of obstacles",
-        levels=", ".join(str(level) for level in sorted(set(episodes["level"]) - {0})),
+        conditions=_calm(names),
+        echoes=BASE["sonar.echo_reports"],
         scenarios="\n".join(_scenario(name, own) for name, own in scenarios),
     )
 
@@ -48,7 +48,8 @@ def _picture(scenario: str) -> str:
 
 def _calm(scenarios: list[str]) -> str:
     """Conditions at level 0."""
-    phrases = [conditions(load_scenario(name, overrides=BASE)) for name in scenarios if name in scenario_names()]
+    shipped = [name for name in scenarios if name in scenario_names()]
+    phrases = [conditions(load_scenario(name, overrides=overrides(CALM, 0, name))) for name in shipped]
     return "; ".join(dict.fromkeys(phrases)) or f"{IDEAL}, unless the scenario says otherwise"
 
 
@@ -61,7 +62,8 @@ def _main(table: Any) -> Any:
 def _scenario(name: str, table: Any) -> str:
     """A scenario's tables and picture."""
     picture = f"![Success over severity on {name}]({_picture(name)})"
-    return f"## {name}\n\n{_scores(table)}\n{_axes(_main(table))}\n{picture}\n"
+    levels = ", ".join(map(str, sorted({level for _, level in table.columns[table.notna().any()]} - {0})))
+    return f"## {name}\n\nLevels {levels}.\n\n{_scores(table)}\n{_axes(_main(table))}\n{picture}\n"
 
 
 def _scores(table: Any) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from uuv_marl.benchmark.estimates import FEWEST, Estimate, estimate
 from uuv_marl.benchmark.robustness.axes import AXES, CALM
+from uuv_marl.benchmark.robustness.job import METRICS
 from uuv_marl.types import Float64
 
 ENOUGH = 0.9
@@ -21,8 +22,15 @@ scored = partial(estimate, statistic=np.mean, fewest=FEWEST)
 
 
 def by_seed(episodes: Any) -> Any:
-    """Success with a row for each scenario, policy and seed, and a column for each axis and level."""
-    return episodes.pivot_table("success_share", ["scenario", "policy", "seed"], ["axis", "level"])
+    """Success with a row for each scenario, policy and seed, and a column for each axis and level.
+
+    A task's own main metric, in a column after ``METRICS``, takes the place of ``success_share``.
+    """
+    rows, columns = ["scenario", "policy", "seed"], ["axis", "level"]
+    success = episodes["success_share"]
+    for name in episodes.columns.difference([*rows, *columns, *METRICS], sort=False):
+        success = episodes[name].fillna(success)
+    return episodes.assign(success=success).pivot_table("success", rows, columns)
 
 
 def axis_score(table: Any, axis: str) -> Estimate | None:
