@@ -9,3 +9,8 @@ SECOND = {file.stem: str(file) for file in sorted(Path(__file__).parent.glob("ve
 def runnable(policy: str) -> str:
     """The policy of a name in a table: the path of a second training, any other name unchanged."""
     return SECOND.get(policy, policy)
+
+
+def first_of(policy: str) -> str:
+    """The name of the network that a second training repeats: that of ``mappo_2`` is ``mappo``."""
+    return policy.rpartition("_")[0]

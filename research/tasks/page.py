@@ -7,7 +7,8 @@ import numpy as np
 
 from research.data import read_text
 from research.episodes import Row, grouped, measured, read_rows, short
-from research.second import runnable
+from research.learners.statistics import estimate, resampled
+from research.second import SECOND, first_of, runnable
 from research.tasks import failures
 from research.tasks.studies import STUDIES, Study, set_name
 from uuv_marl.baselines.making import policy_requirements
@@ -107,29 +108,48 @@ def _size(row: Row) -> int:
 def _final(groups: Groups, study: Study) -> str:
     """The headline and the swarm success on the final seeds.
 
-    Networks and policies that send messages have their gain over the best controller without messages there.
+    A network has its gain over the best controller that observes no more, and one that was trained several times a
+    second row for all of its trainings.
     """
     heads, table = ["policy"], dict[str, list[str]]()
     for scenario, name in study.final.items():
         mine = {policy: rows for (policy, where), rows in groups.items() if where == name}
-        shares = {policy: np.array(measured(rows, study.headline)) for policy, rows in mine.items()}
-        controllers = [
-            policy for policy in mine
-            if not (is_trained(policy) or _talks(policy))
-            and not (policy.startswith(_NOT_CONTROLLERS) or "_informed" in policy)
-        ]  # fmt: skip
-        best = max(controllers, key=lambda controller: shares[controller].mean())
-        heads += [scenario, "gain over the best controller"]
-        for policy, rows in mine.items():
-            gain = with_interval([shares[policy] - shares[best]]) if is_trained(policy) or _talks(policy) else ""
-            score_text = f"{with_interval([shares[policy]])}, {_mean([rows], 'swarm_success')}"
-            table.setdefault(policy, [named(policy)]).extend((score_text, gain))
+        heads += [scenario, "gain"]
+        for policy in (policy for policy in mine if policy not in SECOND):
+            every = [policy, *(other for other in mine if other in SECOND and first_of(other) == policy)]
+            for trainings in [[policy], every][: len(every)]:
+                title = named(policy) + (f", {len(every)} trainings" if len(trainings) > 1 else "")
+                table.setdefault(title, [title]).extend(_final_cells(mine, trainings, study.headline))
     return markdown_table(heads, table.values())
 
 
-def _talks(policy: str) -> bool:
-    """Whether a policy sends messages."""
-    return policy_requirements(runnable(policy)).message_entries > 0
+def _final_cells(mine: Mapping[str, Sequence[Row]], trainings: Sequence[str], headline: str) -> tuple[str, str]:
+    """The headline with its interval over trainings and episodes, swarm success, and a network's gain."""
+    policy, rows = trainings[0], [row for training in trainings for row in mine[training]]
+    shares = {name: np.array(measured(own, headline)) for name, own in mine.items()}
+    own = np.stack([shares[training] for training in trainings])
+    rivals = [name for name in mine if _is_controller(name) and observed(name) <= observed(policy)]
+    if not (is_trained(policy) and rivals):
+        return _pair(resampled([own], 0)[0], rows), ""
+    best = max(rivals, key=lambda rival: shares[rival].mean())
+    means, others = resampled([own, shares[best][None]], 0)
+    gain = estimate(means.mean(axis=1) - others.mean(axis=1))
+    return _pair(means, rows), f"{short(gain.point)} [{short(gain.low)}, {short(gain.high)}] over {best}"
+
+
+def _pair(means: Float64, rows: Sequence[Row]) -> str:
+    """The mean over trainings with its interval, from ``resampled``, and swarm success."""
+    share = estimate(means.mean(axis=1))
+    return f"{short(share.point)} [{short(share.low)}, {short(share.high)}], {_mean([rows], 'swarm_success')}"
+
+
+def _is_controller(policy: str) -> bool:
+    return not (is_trained(policy) or policy.startswith(_NOT_CONTROLLERS))
+
+
+def observed(policy: str) -> frozenset[str]:
+    """What a policy observes beyond every vehicle's percept."""
+    return frozenset(policy_requirements(runnable(policy)).channels)
 
 
 def named(policy: str) -> str:

@@ -21,8 +21,11 @@ from uuv_marl.tasks.maps.guidance import PATH_FIELDS, path_terms
 from uuv_marl.tasks.maps.walls import Range, Span, between
 from uuv_marl.tasks.reach import Reach
 from uuv_marl.tasks.reward import Terms
+from uuv_marl.tasks.search import FORGET_S, fans, note_seen, num_cells
 from uuv_marl.types import Bool, Float64, Int64
 
+_SEARCH_SHARE = 0.3
+"""Reward for a box of which each vehicle sees its share once, over that for a target held all the time [1]. Assumed."""
 LEAD_S = 2.0
 """The channel ``path`` leads to where a target will be after this time [s]. Assumed, tried by hand with ``oracle``."""
 
@@ -75,6 +78,8 @@ class SilentTargetsMemory(NamedTuple):
     found_s: Annotated[Float64, "world target", "When the target was first held [s]; infinite before."]
     held: Annotated[Float64, "world target", "Decisions of the last half at which it was held."]
     judged: Annotated[Float64, "world", "Decisions of the last half."]
+    seen_s: Annotated[Float64, "world cell", "When an active array last saw the cell, for the reward ``search`` [s]."]
+    newly_seen: Annotated[Float64, "world vehicle", "Number of cells that the vehicle saw anew in the latest step."]
 
 
 @compiled
@@ -108,6 +113,14 @@ def walk(
             velocity[w, k, 0], velocity[w, k, 1] = memory.speed[w, k] * c, memory.speed[w, k] * s
 
 
+_DENSE = {
+    **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "stay"},
+    "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no "
+    "nearer vehicle holds, 0 if there is none, D: progress_far_m, c: progress_m",
+    "held": "+w_arrival · dt/T for each target that is held, to the vehicle nearest to it; T: the time limit",
+}
+
+
 class SilentTargets(Reach):
     """Find targets that move in a box and return only echoes, and stay within ``held_m`` of them.
 
@@ -121,11 +134,10 @@ class SilentTargets(Reach):
         PerceptField("box", (2,), DIRECTION, "cosine and sine of the compass heading from the box's first axis"),
     )
     channels: ClassVar[Mapping[str, FieldTable]] = {"path": PATH_FIELDS}
-    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": {
-        **{name: formula for name, formula in Reach.rewards["dense"].items() if name != "stay"},
-        "progress": "Phi now - Phi before, Phi = -min(d, D)/c; d: distance to the nearest target that no "
-        "nearer vehicle holds, 0 if there is none, D: progress_far_m, c: progress_m",
-        "held": "+w_arrival · dt/T for each target that is held, to the vehicle nearest to it; T: the time limit",
+    rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": _DENSE, "search": {
+        **_DENSE,
+        "search": f"+{_SEARCH_SHARE:g} · w_arrival · n for the area that the vehicle's active arrays see anew, in "
+        f"boxes; n: number of vehicles; an area seen t before counts min(t, {FORGET_S:g} s) / {FORGET_S:g} s",
     }}  # fmt: skip
     traffic: ClassVar[bool] = False
     has_goal: ClassVar[bool] = False
@@ -141,6 +153,7 @@ class SilentTargets(Reach):
 
     def __init__(self, swarm: Swarm) -> None:
         super().__init__(swarm)
+        self._fans = fans(swarm.scenario)
         length, width = swarm.scenario.start.sides(swarm.num_vehicles)
         if math.hypot(0.5 * length, width + 0.5 * swarm.scenario.start.gap_m) > self.numbers.clear_m:
             raise ScenarioError(
@@ -153,7 +166,8 @@ class SilentTargets(Reach):
         """An obstacle per target, and all turns of an episode."""
         numbers, limit = scenario.task_numbers, scenario.time_limit.of(cls.longest_s(scenario))
         turns = math.ceil(limit / numbers.turn_s[0])
-        return {"point": 2, "obstacle": numbers.targets, "target": numbers.targets, "turn": turns}
+        return {"point": 2, "obstacle": numbers.targets, "target": numbers.targets, "turn": turns,
+                "cell": num_cells(numbers.side_m)}  # fmt: skip
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
@@ -174,6 +188,7 @@ class SilentTargets(Reach):
         memory.turn_at[world] = np.cumsum(spans, axis=1)
         memory.turn_by[world] = rng.uniform(-math.pi, math.pi, (m, turns))
         memory.found_s[world] = math.inf
+        memory.seen_s[world] = -FORGET_S
         middle = np.array([[-1.0, 0.0], [0.0, 0.0]])
         return EpisodeSetup(
             (middle,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
@@ -232,6 +247,9 @@ class SilentTargets(Reach):
         memory.found_s[found] = np.minimum(memory.found_s, time_s[:, None])[found]
         memory.remaining_before_m[running] = memory.remaining_m[running]
         memory.remaining_m[running] = self._remaining_m()[running]
+        if "search" in self.terms:
+            half, state = 0.5 * self.numbers.side_m, self.swarm.state
+            note_seen(running, time_s, half, self._fans, state.eta, state.alive, memory.seen_s, memory.newly_seen)
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The heading in the box, and with the channel ``path`` the path to the vehicle's own target.
@@ -268,15 +286,23 @@ class SilentTargets(Reach):
         return {**super().state(), **own}
 
     def reward(self, running: Bool) -> Terms:
-        """Progress and costs of ``reach``, and the term ``held`` in place of ``stay``."""
+        """Progress and costs of ``reach``, the term ``held`` in place of ``stay``, and in ``search`` that term."""
         share = self.swarm.scenario.timing.decision_period_s / self.swarm.time_limit_s
         away, nearest = self._nearest()
         num_held = ((away == nearest) & (nearest <= self.numbers.held_m)).sum(axis=2)
-        return {**super().reward(running), "held": self._weight.arrival * share[:, None] * num_held}
+        terms = {**super().reward(running), "held": self._weight.arrival * share[:, None] * num_held}
+        if "search" not in self.terms:
+            return terms
+        cells = self.memory.seen_s.shape[1] / self.swarm.num_vehicles
+        return {**terms, "search": _SEARCH_SHARE * self._weight.arrival * self.memory.newly_seen / cells}
 
     def remaining_m(self) -> tuple[Float64, Float64]:
         """Distance to the nearest target that no nearer vehicle holds, now and before the step [m]."""
         return self.memory.remaining_m, self.memory.remaining_before_m
+
+    def path_length_m(self) -> Float64:
+        """Distance to the nearest target that no nearer vehicle holds [m], 0 without one, shape (world, vehicle)."""
+        return self.memory.remaining_m
 
     def done(self) -> Bool:
         """No world: the time limit ends the episode."""

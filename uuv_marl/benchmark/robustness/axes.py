@@ -44,7 +44,7 @@ class Axis(NamedTuple):
         return {f: speed_mps * v if f in self.of_speed else v for f, v in changes.items()}
 
     def concerns(self, policy: str, scenario: Scenario) -> bool:
-        """Whether the policy uses the disturbed channels, and obstacles of the scenario's task can move if they must."""
+        """Whether the policy uses the disturbed channels, and the scenario's obstacles can move if they have to."""
         moves = any(field.startswith("traffic.") for field in self.changes[0])
         used = not self.channels or not self.channels.isdisjoint(policy_requirements(policy).channels)
         return used and (scenario.task_class.traffic or not moves)
