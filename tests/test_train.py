@@ -981,6 +981,14 @@ def test_a_training_fills_in_what_is_left_out(tmp_path):
     assert recipe_fields("starter") == {"scenario": "starter"}
 
 
+def test_changed_channels_are_those_of_all_scenarios_and_other_changes_of_the_first_alone():
+    changes = {"sonar.channels": ["identity"], "time_limit.extra_s": 9.0}
+    training = Training(scenario="silent_targets", extra_scenarios=["silent_targets_easy"], overrides=changes)
+    first, second = (part.scenario for part in training.parts)
+    assert first.sonar.channels == second.sonar.channels == ("identity",)
+    assert (first.time_limit.extra_s, second.time_limit.extra_s) == (9.0, 0.0)
+
+
 @pytest.mark.parametrize(("wrong", "message"), [
     ({"ppo": {"learning_rate": (np.inf, 0.1)}}, "ppo.learning_rate.0 must be a finite number, got inf"),
     ({"ppo": {"noize": 0.1}}, "ppo.noize is unknown; did you mean 'ppo.noise'"),

@@ -106,7 +106,8 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     extra_scenarios: tuple[str, ...] = ()
     """Further scenarios for the same network, in equal parts, with the same observation, vehicle and clock."""
     overrides: dict[str, Any] = {}
-    """Changed fields of ``scenario``; ``OVERRIDES`` apply to fields that are not given."""
+    """Changed fields of ``scenario``; ``OVERRIDES`` apply to fields that are not given. ``sonar.channels`` changes
+    ``extra_scenarios``, too, which need the same observation."""
     sizes: Annotated[tuple[tuple[PositiveInt, NonNegativeInt], ...], pydantic.BeforeValidator(_paired)] = ()
     """Pairs of numbers of vehicles and worlds, or numbers of vehicles; the scenario's own if empty. Without a number of
     worlds, or with 0, each size gets about the same number of vehicles, ``ROWS`` in total."""
@@ -205,9 +206,10 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
     def _scenarios(self) -> dict[str, Scenario]:
         if self.base_controller:
             check_base_controller(self.base_controller)
+        shared = {field: value for field, value in self.overrides.items() if field == "sonar.channels"}
         loaded = {
-            name: load_scenario(name, overrides=overrides_for(name, self.overrides if name == self.scenario else {}))
-            for name in (self.scenario, *self.extra_scenarios)
+            name: load_scenario(name, overrides=overrides_for(name, own))
+            for name, own in [(self.scenario, self.overrides), *((name, shared) for name in self.extra_scenarios)]
         }
         return {
             name: with_policy_requirements(self.base_controller, each) if self.base_controller else each
