@@ -23,7 +23,7 @@ AT_REST = [task for task in PLACES if task != "silent_targets"]
 """Tasks that have a place to be at."""
 PAID = [(task, reward) for task in PLACES for reward in task_class(task).rewards]
 ONCE = {"arrival", "stay", "held", "search"}
-"""Terms that reward a place or what is seen anew; ``progress`` may be negative, and all others are costs."""
+"""Terms that reward a place or an area covered; ``progress`` may be negative, and all others are costs."""
 GUIDED = [
     ("follow", "starter", 5, "dense", 40), ("follow", "starter", 5, "sparse", 30),
     ("follow", "single_obstacle", 54, "dense", 2), ("reach", "starter", 5, "dense", 40),

@@ -152,41 +152,41 @@ def test_the_search_refuses_what_has_no_box():
         make_policy("nearest_target", with_policy_requirements("nearest_target", load_scenario("starter")))
 
 
-def newly_seen(**changes):
-    """Swarm and cells that it has seen anew since it was put outside the box, per vehicle."""
+def outside(**changes):
+    """A batch whose vehicles are outside the box."""
     batch = batched("silent_targets", changes, seed=TUNING, reward="search")
     alone(batch.swarm)
     batch.step(np.zeros((1, batch.swarm.num_vehicles, 2)))
-    assert (batch.swarm.task.memory.newly_seen == 0.0).all()
+    assert (batch.swarm.task.memory.newly_covered == 0.0).all()
     return batch
 
 
-def test_a_search_is_paid_for_the_area_that_the_bow_sees_anew_by_any_vehicle():
-    batch = newly_seen()
+def test_a_search_is_paid_for_the_area_that_the_bow_covers_and_no_vehicle_has_just_covered():
+    batch = outside()
     swarm, memory = batch.swarm, batch.swarm.task.memory
     idle = np.zeros((1, swarm.num_vehicles, 2))
-    memory.seen_s[:] = -1e3
+    memory.covered_s[:] = -1e3
     swarm.state.eta[0, :2] = (300.0, 300.0, 0.7)
     paid = batch.step(idle).terms["search"]
     area = math.pi / 3.0 * 100.0**2  # a fan of 120 degrees
-    assert memory.newly_seen[0, 0] * 25.0**2 == pytest.approx(area, rel=0.1)
-    np.testing.assert_array_equal(memory.newly_seen[0, 1:], 0.0)
-    whole = memory.seen_s.shape[1] / swarm.num_vehicles
-    assert paid[0, 0] == pytest.approx(0.3 * swarm.scenario.reward.arrival * memory.newly_seen[0, 0] / whole)
-    seen = np.flatnonzero(memory.seen_s[0] > 0.0)
+    assert memory.newly_covered[0, 0] * 25.0**2 == pytest.approx(area, rel=0.1)
+    np.testing.assert_array_equal(memory.newly_covered[0, 1:], 0.0)
+    whole = memory.covered_s.shape[1] / swarm.num_vehicles
+    assert paid[0, 0] == pytest.approx(0.3 * swarm.scenario.reward.arrival * memory.newly_covered[0, 0] / whole)
+    seen = np.flatnonzero(memory.covered_s[0] > 0.0)
     east, north = seen % 48, seen // 48
     ahead = np.arctan2((east + 0.5) * 25.0 - 900.0, (north + 0.5) * 25.0 - 900.0)
     assert np.abs(ahead - 0.7).max() <= math.pi / 3.0
-    memory.seen_s[0, seen] -= 25.0
+    memory.covered_s[0, seen] -= 25.0
     alone(swarm)
     swarm.state.eta[0, 2] = (300.0, 300.0, 0.7)
     batch.step(idle)
     period = swarm.scenario.timing.decision_period_s
-    assert memory.newly_seen[0, 2] == pytest.approx((25.0 + period) / 100.0 * len(seen))
+    assert memory.newly_covered[0, 2] == pytest.approx((25.0 + period) / 100.0 * len(seen))
 
 
 def test_a_search_is_noted_for_its_reward_alone():
     swarm = water()
-    before = swarm.task.memory.seen_s.copy()
+    before = swarm.task.memory.covered_s.copy()
     swarm.step(np.zeros((1, swarm.num_vehicles, 2)))
-    np.testing.assert_array_equal(swarm.task.memory.seen_s, before)
+    np.testing.assert_array_equal(swarm.task.memory.covered_s, before)

@@ -14,7 +14,7 @@ SCENARIOS = {
     "few_informed": "few_informed_easy", "silent_targets": "silent_targets_easy",
 }  # fmt: skip
 CASES = [(task, reward) for task in SCENARIOS for reward in task_class(task).rewards]
-UNKNOWN = {"turn_at", "turn_by", "turns", "seen_s"}
+UNKNOWN = {"turn_at", "turn_by", "turns", "covered_s"}
 """Of ``silent_targets``: draws that the episode has not come to, random for whoever knows only the present, and the
 thousands of cells of the reward ``search``, which would make most of the state."""
 

@@ -1,4 +1,4 @@
-"""Cells of a box that active arrays see, as a reward for searching it."""
+"""Cells of a box that active arrays cover, for a reward for searching it."""
 
 import math
 
@@ -12,7 +12,7 @@ from uuv_marl.types import Bool, Float64
 CELL_M = 25.0
 """Side of a cell [m]. Assumed: a quarter of the bow's range."""
 FORGET_S = 100.0
-"""Time after which a seen cell is new again [s]. Assumed: in it a target moves farther than an array's range."""
+"""Time after which a covered cell counts in full again [s]. Assumed: a target moves farther than an array's range."""
 
 
 def num_cells(side_m: float) -> int:
@@ -28,12 +28,19 @@ def fans(scenario: Scenario) -> Float64:
 
 
 @compiled
-def note_seen(
-    worlds: Bool, time_s: Float64, half: float, fan: Float64, eta: Float64, alive: Bool, seen_s: Float64, new: Float64
+def cover(
+    worlds: Bool,
+    time_s: Float64,
+    half: float,
+    fan: Float64,
+    eta: Float64,
+    alive: Bool,
+    covered_s: Float64,
+    newly: Float64,
 ) -> None:
-    """Note when cells were last seen, and fill ``new`` with the cells that each vehicle sees anew.
+    """Note when cells were last covered, and count those that each vehicle covers.
 
-    A cell seen by any vehicle t seconds before counts min(t, FORGET_S) / FORGET_S.
+    A cell that any vehicle covered t seconds before counts min(t, FORGET_S) / FORGET_S.
 
     Args:
         worlds: to be updated, shape (world,).
@@ -41,14 +48,14 @@ def note_seen(
         half: of the box's side [m].
         fan: see ``fans``.
         eta: positions [m] and headings [rad], shape (world, vehicle, 3).
-        alive: vehicles that see, shape (world, vehicle).
-        seen_s: when each cell was last seen [s], shape (world, cell); changed.
-        new: number of new cells, shape (world, vehicle); changed.
+        alive: vehicles that count, shape (world, vehicle).
+        covered_s: when each cell was last covered [s], shape (world, cell); changed.
+        newly: number of cells, shape (world, vehicle); changed.
     """
     side = math.ceil(2.0 * half / CELL_M)
     for w in range(eta.shape[0] if fan.shape[0] else 0):
         for i in range(eta.shape[1] if worlds[w] else 0):
-            new[w, i] = 0.0
+            newly[w, i] = 0.0
             for k in range(fan.shape[0] if alive[w, i] else 0):
                 x, y, reach = eta[w, i, 0] + half, eta[w, i, 1] + half, fan[k, 1]
                 c, s = cos_sin(eta[w, i, 2] + fan[k, 0])
@@ -58,5 +65,5 @@ def note_seen(
                         r = math.sqrt(d_x * d_x + d_y * d_y)
                         if r <= reach and d_x * c + d_y * s >= fan[k, 2] * r:
                             cell = a * side + b
-                            new[w, i] += min(time_s[w] - seen_s[w, cell], FORGET_S) / FORGET_S
-                            seen_s[w, cell] = time_s[w]
+                            newly[w, i] += min(time_s[w] - covered_s[w, cell], FORGET_S) / FORGET_S
+                            covered_s[w, cell] = time_s[w]

@@ -21,11 +21,11 @@ from uuv_marl.tasks.maps.guidance import PATH_FIELDS, path_terms
 from uuv_marl.tasks.maps.walls import Range, Span, between
 from uuv_marl.tasks.reach import Reach
 from uuv_marl.tasks.reward import Terms
-from uuv_marl.tasks.search import FORGET_S, fans, note_seen, num_cells
+from uuv_marl.tasks.search import FORGET_S, cover, fans, num_cells
 from uuv_marl.types import Bool, Float64, Int64
 
 _SEARCH_SHARE = 0.3
-"""Reward for a box of which each vehicle sees its share once, over that for a target held all the time [1]. Assumed."""
+"""Reward where the swarm covers the box once, over that for a target held all the time [1]. Assumed."""
 LEAD_S = 2.0
 """The channel ``path`` leads to where a target will be after this time [s]. Assumed, tried by hand with ``oracle``."""
 
@@ -78,8 +78,8 @@ class SilentTargetsMemory(NamedTuple):
     found_s: Annotated[Float64, "world target", "When the target was first held [s]; infinite before."]
     held: Annotated[Float64, "world target", "Decisions of the last half at which it was held."]
     judged: Annotated[Float64, "world", "Decisions of the last half."]
-    seen_s: Annotated[Float64, "world cell", "When an active array last saw the cell, for the reward ``search`` [s]."]
-    newly_seen: Annotated[Float64, "world vehicle", "Number of cells that the vehicle saw anew in the latest step."]
+    covered_s: Annotated[Float64, "world cell", "When an array last covered the cell, for the reward ``search`` [s]."]
+    newly_covered: Annotated[Float64, "world vehicle", "Number of cells that the vehicle covered in the latest step."]
 
 
 @compiled
@@ -136,8 +136,8 @@ class SilentTargets(Reach):
     channels: ClassVar[Mapping[str, FieldTable]] = {"path": PATH_FIELDS}
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": _DENSE, "search": {
         **_DENSE,
-        "search": f"+{_SEARCH_SHARE:g} · w_arrival · n for the area that the vehicle's active arrays see anew, in "
-        f"boxes; n: number of vehicles; an area seen t before counts min(t, {FORGET_S:g} s) / {FORGET_S:g} s",
+        "search": f"+{_SEARCH_SHARE:g} · w_arrival · n for the share of the box that the vehicle's arrays cover; "
+        f"n: number of vehicles; what was covered t before counts min(t, {FORGET_S:g} s) / {FORGET_S:g} s",
     }}  # fmt: skip
     traffic: ClassVar[bool] = False
     has_goal: ClassVar[bool] = False
@@ -188,7 +188,7 @@ class SilentTargets(Reach):
         memory.turn_at[world] = np.cumsum(spans, axis=1)
         memory.turn_by[world] = rng.uniform(-math.pi, math.pi, (m, turns))
         memory.found_s[world] = math.inf
-        memory.seen_s[world] = -FORGET_S
+        memory.covered_s[world] = -FORGET_S
         middle = np.array([[-1.0, 0.0], [0.0, 0.0]])
         return EpisodeSetup(
             (middle,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
@@ -249,7 +249,7 @@ class SilentTargets(Reach):
         memory.remaining_m[running] = self._remaining_m()[running]
         if "search" in self.terms:
             half, state = 0.5 * self.numbers.side_m, self.swarm.state
-            note_seen(running, time_s, half, self._fans, state.eta, state.alive, memory.seen_s, memory.newly_seen)
+            cover(running, time_s, half, self._fans, state.eta, state.alive, memory.covered_s, memory.newly_covered)
 
     def observe(self, running: Bool) -> Terms:  # noqa: ARG002
         """The heading in the box, and with the channel ``path`` the path to the vehicle's own target.
@@ -293,8 +293,8 @@ class SilentTargets(Reach):
         terms = {**super().reward(running), "held": self._weight.arrival * share[:, None] * num_held}
         if "search" not in self.terms:
             return terms
-        cells = self.memory.seen_s.shape[1] / self.swarm.num_vehicles
-        return {**terms, "search": _SEARCH_SHARE * self._weight.arrival * self.memory.newly_seen / cells}
+        cells = self.memory.covered_s.shape[1] / self.swarm.num_vehicles
+        return {**terms, "search": _SEARCH_SHARE * self._weight.arrival * self.memory.newly_covered / cells}
 
     def remaining_m(self) -> tuple[Float64, Float64]:
         """Distance to the nearest target that no nearer vehicle holds, now and before the step [m]."""
