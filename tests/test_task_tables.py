@@ -39,13 +39,19 @@ def test_reported_episodes_count_from_zero_and_every_set_is_what_its_name_says()
 
 def test_the_page_by_hand():
     done = [*rows("scout", 0.5), *rows("apf", 0.25), *rows("oracle", 1.0), *rows("olfati_saber_informed", 0.9)]
-    done += [*rows("sdc", 0.3), *rows("mappo", 0.75), *rows("research.blind:Blind,inner=mappo", 0.25)]
+    done += [
+        *rows("sdc", 0.3),
+        *rows("mappo", 0.75),
+        *rows("mappo_2", 0.25),
+        *rows("research.blind:Blind,inner=mappo", 0.25),
+    ]
     text = report("hard_water", done)
     assert "| scout | .50 [.50, .50], .00 | .50 [.50, .50], .00 | .50 [.50, .50], .00 |" in text
     assert "| oracle with path, link | 1.00, .00 | 1.00, .00 |" in text
     assert "| sdc with compass, link, identity | .30, .00 | .30, .00 |" in text
     assert "| scout |" + " .50, .00 |" * 7 + " 1.00 | 0.10 | 1.0 m | 1.0 m |" in text
-    assert "| mappo | .75 [.75, .75], .00 | .25 [.25, .25] | .75 [.75, .75], .00 | .25 [.25, .25] |" in text
+    assert "| mappo" + " | .75 [.75, .75], .00 | .25 [.25, .25] over scout" * 2 + " |" in text
+    assert "| mappo, 2 trainings" + " | .50 [.25, .75], .00 | .00 [-.25, .25] over scout" * 2 + " |" in text
     assert "| research.blind:Blind,inner=mappo | .25 [.25, .25], .00 |  |" in text
 
 

@@ -208,8 +208,10 @@ class Training(pydantic.BaseModel, frozen=True, extra="forbid", allow_inf_nan=Fa
             check_base_controller(self.base_controller)
         shared = {field: value for field, value in self.overrides.items() if field == "sonar.channels"}
         loaded = {
-            name: load_scenario(name, overrides=overrides_for(name, own))
-            for name, own in [(self.scenario, self.overrides), *((name, shared) for name in self.extra_scenarios)]
+            name: load_scenario(
+                name, overrides=overrides_for(name, self.overrides if name == self.scenario else shared)
+            )
+            for name in (self.scenario, *self.extra_scenarios)
         }
         return {
             name: with_policy_requirements(self.base_controller, each) if self.base_controller else each
