@@ -17,7 +17,7 @@ Row = Mapping[str, str]
 def cells(metrics: Metrics, names: Sequence[str], digits: str) -> dict[str, str]:
     """Metrics, also the task's own, as texts with ``digits`` such as ``.6g``."""
     metric_values: dict[str, Any] = {**metrics, **metrics.get("task", {})}
-    values = {name: metric_values.get(name) for name in names}
+    values = {name: metric_values[name] for name in names}
     return {k: "" if v is None else f"{v:{digits}}" if isinstance(v, float) else str(v) for k, v in values.items()}
 
 

@@ -14,7 +14,7 @@ from research.episodes import Row, grouped, measured, short, write_rows
 from research.learners.figures import draw_curves
 from research.learners.layout import marl_eval
 from research.learners.protocol import AGENT_STEPS, AGGREGATED, FLOOR, LEARNERS, MINUTES, TASKS, TIE, TRAININGS
-from research.learners.statistics import Estimate, estimate, improvement, resampled
+from research.statistics import Estimate, estimate, improvement, resampled
 from research.tasks.page import named
 from uuv_marl.atomic import write_text
 from uuv_marl.benchmark.style import house_style

@@ -7,8 +7,8 @@ import numpy as np
 
 from research.data import read_text
 from research.episodes import Row, grouped, measured, read_rows, short
-from research.learners.statistics import estimate, resampled
 from research.second import SECOND, first_of, runnable
+from research.statistics import estimate, resampled
 from research.tasks import failures
 from research.tasks.studies import STUDIES, Study, set_name
 from uuv_marl.baselines.making import policy_requirements
@@ -108,8 +108,8 @@ def _size(row: Row) -> int:
 def _final(groups: Groups, study: Study) -> str:
     """The headline and the swarm success on the final seeds.
 
-    A network has its gain over the best controller that observes no more, and one that was trained several times a
-    second row for all of its trainings.
+    A network has its gain over the best controller that observes no more, or else over the best of all, and one that
+    was trained several times a second row for all of its trainings.
     """
     heads, table = ["policy"], dict[str, list[str]]()
     for scenario, name in study.final.items():
@@ -117,7 +117,7 @@ def _final(groups: Groups, study: Study) -> str:
         heads += [scenario, "gain"]
         for policy in (policy for policy in mine if policy not in SECOND):
             every = [policy, *(other for other in mine if other in SECOND and first_of(other) == policy)]
-            for trainings in [[policy], every][: len(every)]:
+            for trainings in [[policy], every] if len(every) > 1 else [[policy]]:
                 title = named(policy) + (f", {len(every)} trainings" if len(trainings) > 1 else "")
                 table.setdefault(title, [title]).extend(_final_cells(mine, trainings, study.headline))
     return markdown_table(heads, table.values())
@@ -128,13 +128,14 @@ def _final_cells(mine: Mapping[str, Sequence[Row]], trainings: Sequence[str], he
     policy, rows = trainings[0], [row for training in trainings for row in mine[training]]
     shares = {name: np.array(measured(own, headline)) for name, own in mine.items()}
     own = np.stack([shares[training] for training in trainings])
-    rivals = [name for name in mine if _is_controller(name) and observed(name) <= observed(policy)]
-    if not (is_trained(policy) and rivals):
+    if not is_trained(policy):
         return _pair(resampled([own], 0)[0], rows), ""
+    controllers = [name for name in mine if not (is_trained(name) or name.startswith(_NOT_CONTROLLERS))]
+    rivals = [name for name in controllers if _channels(name) <= _channels(policy)] or controllers
     best = max(rivals, key=lambda rival: shares[rival].mean())
     means, others = resampled([own, shares[best][None]], 0)
     gain = estimate(means.mean(axis=1) - others.mean(axis=1))
-    return _pair(means, rows), f"{short(gain.point)} [{short(gain.low)}, {short(gain.high)}] over {best}"
+    return _pair(means, rows), f"{short(gain.point)} [{short(gain.low)}, {short(gain.high)}] over {named(best)}"
 
 
 def _pair(means: Float64, rows: Sequence[Row]) -> str:
@@ -143,19 +144,14 @@ def _pair(means: Float64, rows: Sequence[Row]) -> str:
     return f"{short(share.point)} [{short(share.low)}, {short(share.high)}], {_mean([rows], 'swarm_success')}"
 
 
-def _is_controller(policy: str) -> bool:
-    return not (is_trained(policy) or policy.startswith(_NOT_CONTROLLERS))
-
-
-def observed(policy: str) -> frozenset[str]:
-    """What a policy observes beyond every vehicle's percept."""
-    return frozenset(policy_requirements(runnable(policy)).channels)
-
-
 def named(policy: str) -> str:
     """A policy with its extra observations."""
     channels = policy_requirements(runnable(policy)).channels
     return f"{policy} with {', '.join(channels)}" if channels else policy
+
+
+def _channels(policy: str) -> set[str]:
+    return {*policy_requirements(runnable(policy)).channels}
 
 
 def _policies(groups: Groups) -> list[str]:

@@ -120,7 +120,9 @@ def _kind(head: Sequence[str]) -> Kind | None:
 
 
 def _written(measured: Sequence[str], digits: str, _: Cells, metrics: Metrics) -> Sequence[str]:
-    return list(cells_of(metrics, measured, digits).values())
+    of_task = [name for name in measured if name in metrics or name in metrics.get("task", {})]
+    made = cells_of(metrics, of_task, digits)
+    return [made.get(name, "") for name in measured]
 
 
 def _of(case: Case) -> Source:

@@ -14,7 +14,7 @@ from research.learners import cells, isac, page, protocol, tune, watch
 from research.learners.layout import marl_eval
 from research.learners.protocol import AGGREGATED, LEARNERS, TASKS, TIE, TUNING
 from research.learners.squashed import Squashed
-from research.learners.statistics import estimate, improvement, resampled
+from research.statistics import estimate, improvement, resampled
 from tests.processes import ROOT
 from uuv_marl.errors import ResultsError
 from uuv_marl.scenario import load_scenario

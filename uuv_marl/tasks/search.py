@@ -29,15 +29,9 @@ def fans(scenario: Scenario) -> Float64:
 
 @compiled
 def cover(
-    worlds: Bool,
-    time_s: Float64,
-    half: float,
-    fan: Float64,
-    eta: Float64,
-    alive: Bool,
-    covered_s: Float64,
+    worlds: Bool, time_s: Float64, half: float, fan: Float64, eta: Float64, alive: Bool, covered_s: Float64,
     newly: Float64,
-) -> None:
+) -> None:  # fmt: skip
     """Note when cells were last covered, and count those that each vehicle covers.
 
     A cell that any vehicle covered t seconds before counts min(t, FORGET_S) / FORGET_S.

@@ -300,10 +300,6 @@ class SilentTargets(Reach):
         """Distance to the nearest target that no nearer vehicle holds, now and before the step [m]."""
         return self.memory.remaining_m, self.memory.remaining_before_m
 
-    def path_length_m(self) -> Float64:
-        """Distance to the nearest target that no nearer vehicle holds [m], 0 without one, shape (world, vehicle)."""
-        return self.memory.remaining_m
-
     def done(self) -> Bool:
         """No world: the time limit ends the episode."""
         return np.zeros(self.swarm.num_worlds, np.bool_)

@@ -162,25 +162,15 @@ class TwoSwarms(Reach):
         if "path" not in swarm.scenario.sonar.channels:
             return {}
         turn, at = self.memory.turn[:, None], self.memory.gap[:, None]
-        place, goal = self._in_map()
+        place, goal = in_axes(swarm.state.eta[:, :, :2], turn), in_axes(swarm.world_map.waypoints[:, :, 1], turn)
         along, edge = place[:, :, 0] * side, self.numbers.radius_m + _BEFORE_M
         point = np.stack([side * np.maximum(along + AHEAD_M, -edge), np.broadcast_to(at, side.shape)], axis=2)
         point = np.where((along + AHEAD_M > edge)[:, :, None], goal, point)
         to_come = (side > 0.0) & swarm.state.alive & ~swarm.state.collided & (along < edge)
         first = (side > 0.0) | ~to_come.any(axis=1, keepdims=True)
-        terms = path_terms(swarm, in_axes(point - place, turn * [1.0, -1.0]), self.path_length_m())
+        length = np.where(along < 0.0, _through(place, goal, at), swarm.facts.away)
+        terms = path_terms(swarm, in_axes(point - place, turn * [1.0, -1.0]), length)
         return {**terms, "right_of_way": first[:, :, None].astype(np.float64)}
-
-    def _in_map(self) -> tuple[Float64, Float64]:
-        """Places and goals in the map's frame [m], shape (world, vehicle, 2)."""
-        turn, goals = self.memory.turn[:, None], self.swarm.world_map.waypoints[:, :, 1]
-        return in_axes(self.swarm.state.eta[:, :, :2], turn), in_axes(goals, turn)
-
-    def path_length_m(self) -> Float64:
-        """Length of each vehicle's path through the gap's middle to its goal [m], shape (world, vehicle)."""
-        place, goal = self._in_map()
-        through = _through(place, goal, self.memory.gap[:, None])
-        return np.where(place[:, :, 0] * self.memory.side < 0.0, through, self.swarm.facts.away)
 
     def metrics(self, world: int) -> dict[str, float | None]:
         """Also the columns."""
