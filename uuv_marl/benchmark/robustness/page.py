@@ -37,6 +37,7 @@ def report(episodes: Any) -> str:
         headline=f"{len(episodes):,} episodes on {', '.join(f'`{name}`' for name in names)}",
         conditions=_calm(names),
         echoes=BASE["sonar.echo_reports"],
+        axes="; ".join(f"{name}: {axis.title}" for name, axis in AXES.items() if (episodes["axis"] == name).any()),
         scenarios="\n".join(_scenario(name, own) for name, own in scenarios),
     )
 
@@ -84,9 +85,9 @@ def _scores(table: Any) -> str:
 def _axes(table: Any) -> str:
     """A row for each axis that was run, a column for each policy: the mean success over the levels."""
     policies = dict[str, Any](iter(table.groupby(level="policy", sort=False)))
-    rows = [(name, AXES[name].title, *(_text(axis_score(own, name)) for own in policies.values())) for name in AXES]
-    shown = [row for row in rows if any(cell != NOTHING for cell in row[2:])]
-    return markdown_table(("axis", "disturbance", *policies), shown)
+    rows = [(name, *(_text(axis_score(own, name)) for own in policies.values())) for name in AXES]
+    shown = [row for row in rows if any(cell != NOTHING for cell in row[1:])]
+    return markdown_table(("axis", *policies), shown)
 
 
 def _text(score: Estimate | None) -> str:
