@@ -109,17 +109,16 @@ def _final(groups: Groups, study: Study) -> str:
     """The headline and the swarm success on the final seeds.
 
     A network has its gain over the best controller that observes no more, or else over the best of all, and one that
-    was trained several times a second row for all of its trainings. Policies with fewer episodes than others have no row.
+    was trained several times a second row for all of its trainings.
     """
     heads, table = ["policy"], dict[str, list[str]]()
     for scenario, name in study.final.items():
-        every = {policy: rows for (policy, where), rows in groups.items() if where == name}
-        mine = {policy: rows for policy, rows in every.items() if len(rows) == max(map(len, every.values()))}
+        mine = {policy: rows for (policy, where), rows in groups.items() if where == name}
         heads += [scenario, "gain"]
         for policy in (policy for policy in mine if policy not in SECOND):
-            again = [policy, *(other for other in mine if other in SECOND and first_of(other) == policy)]
-            for trainings in [[policy], again] if len(again) > 1 else [[policy]]:
-                title = named(policy) + (f", {len(again)} trainings" if len(trainings) > 1 else "")
+            every = [policy, *(other for other in mine if other in SECOND and first_of(other) == policy)]
+            for trainings in [[policy], every] if len(every) > 1 else [[policy]]:
+                title = named(policy) + (f", {len(every)} trainings" if len(trainings) > 1 else "")
                 table.setdefault(title, [title]).extend(_final_cells(mine, trainings, study.headline))
     return markdown_table(heads, table.values())
 
