@@ -103,7 +103,7 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
     words = "--scenario starter --axis A1 --axis C1 --level 1 --level 5 --policy bio_inspired --seeds 1 --output"
     succeeds("robustness", *words.split(), tmp_path)
     text = (tmp_path / "robustness.md").read_text()
-    assert "Axes: A1: actuator lag." in text
+    assert "The axes are A1 (actuator lag)." in text
     assert "| A1 |" in text
     assert "C1" not in text, "it uses neither link nor modem"
     assert "still water, no noise, no delay" in text

@@ -37,7 +37,7 @@ def report(episodes: Any) -> str:
         headline=f"{len(episodes):,} episodes on {', '.join(f'`{name}`' for name in names)}",
         conditions=_calm(names),
         echoes=BASE["sonar.echo_reports"],
-        axes="; ".join(f"{name}: {axis.title}" for name, axis in AXES.items() if (episodes["axis"] == name).any()),
+        axes=", ".join(f"{name} ({axis.title})" for name, axis in AXES.items() if (episodes["axis"] == name).any()),
         scenarios="\n".join(_scenario(name, own) for name, own in scenarios),
     )
 
