@@ -1,4 +1,4 @@
-"""``robustness.md``: every policy's scores by group and by axis, written from the table of episodes alone."""
+"""``robustness.md``: every policy's scores by group, and its worst axes, written from the table of episodes alone."""
 
 from importlib import resources
 from pathlib import Path
@@ -16,6 +16,8 @@ from uuv_marl.benchmark.tables import NOTHING, markdown_table
 from uuv_marl.scenario import IDEAL, conditions, load_scenario, scenario_names
 
 _GROUPS = [*(group for group in GROUPS if group != "X"), EVERY, "X"]
+_WORST = 3
+"""Axes that a policy's row names."""
 
 
 def write_robustness_report(folder: Path) -> list[Path]:
@@ -62,10 +64,10 @@ def _main(table: Any) -> Any:
 
 
 def _scenario(name: str, table: Any) -> str:
-    """A scenario's tables and picture."""
+    """A scenario's table and picture."""
     picture = f"![Success over severity on {name}]({_picture(name)})"
     levels = ", ".join(map(str, sorted({level for _, level in table.columns[table.notna().any()]} - {0})))
-    return f"## {name}\n\nLevels {levels}.\n\n{_scores(table)}\n{_axes(_main(table))}\n{picture}\n"
+    return f"## {name}\n\nLevels {levels}.\n\n{_scores(table)}\n{picture}\n"
 
 
 def _scores(table: Any) -> str:
@@ -77,17 +79,15 @@ def _scores(table: Any) -> str:
         undisturbed: Any = own[CALM].dropna().to_numpy() if CALM in own else ()
         calm = _text(scored(undisturbed) if len(undisturbed) else None)
         best = scores[EVERY] or scores["X"]
-        rows.append((best.value if best else -1.0, (policy, f"{len(own)}", calm, *cells)))
-    head = ("policy", "seeds", "undisturbed", *(GROUPS.get(group, group) for group in _GROUPS))
+        rows.append((best.value if best else -1.0, (policy, f"{len(own)}", calm, *cells, _worst(own))))
+    head = ("policy", "seeds", "undisturbed", *(GROUPS.get(group, group) for group in _GROUPS), "worst axes")
     return markdown_table(head, [cells for _, cells in sorted(rows, key=lambda row: row[0], reverse=True)])
 
 
-def _axes(table: Any) -> str:
-    """A row for each axis that was run, a column for each policy: the mean success over the levels."""
-    policies = dict[str, Any](iter(table.groupby(level="policy", sort=False)))
-    rows = [(name, *(_text(axis_score(own, name)) for own in policies.values())) for name in AXES]
-    shown = [row for row in rows if any(cell != NOTHING for cell in row[1:])]
-    return markdown_table(("axis", *policies), shown)
+def _worst(table: Any) -> str:
+    """The axes, but X, with a policy's lowest scores, the lowest first."""
+    scores = {name: score.value for name in AXES if name != "X" and (score := axis_score(table, name))}
+    return ", ".join(f"{name} {scores[name]:.2f}" for name in sorted(scores, key=scores.__getitem__)[:_WORST]) or NOTHING
 
 
 def _text(score: Estimate | None) -> str:
