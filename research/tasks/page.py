@@ -49,7 +49,7 @@ def report(task: str, rows: Sequence[Row]) -> str:
         many=_measures(
             groups, study, {kind: [many] for kind in kinds if (many := set_name(task, kind, 54)) in study.sets}
         ),
-        final=_final(groups, study),
+        final=_final(groups, study) + _others(groups, study),
         failures=failures.table(read_rows(failures.ROWS), task),
         informed=_shares(groups, study, {name: [set_name(name, "", 20)] for name in _tiers(task)}, "success_share"),
     )
@@ -113,7 +113,7 @@ def _final(groups: Groups, study: Study) -> str:
     """
     heads, table = ["policy"], dict[str, list[str]]()
     for scenario, name in study.final.items():
-        mine = {policy: rows for (policy, where), rows in groups.items() if where == name}
+        mine, _ = _by_length(groups, name)
         heads += [scenario, "gain"]
         for policy in (policy for policy in mine if policy not in SECOND):
             every = [policy, *(other for other in mine if other in SECOND and first_of(other) == policy)]
@@ -121,6 +121,28 @@ def _final(groups: Groups, study: Study) -> str:
                 title = named(policy) + (f", {len(every)} trainings" if len(trainings) > 1 else "")
                 table.setdefault(title, [title]).extend(_final_cells(mine, trainings, study.headline))
     return markdown_table(heads, table.values())
+
+
+def _others(groups: Groups, study: Study) -> str:
+    """The headline of the policies that ran on the first final seeds only, the best first, as a paragraph."""
+    texts, seeds = list[str](), 0
+    for scenario, name in study.final.items():
+        _, mine = _by_length(groups, name)
+        means = {policy: float(np.mean(measured(rows, study.headline))) for policy, rows in mine.items()}
+        if ranked := sorted(means, key=means.__getitem__, reverse=True):
+            seeds = len(mine[ranked[0]])
+            texts.append(f"on `{scenario}` " + ", ".join(f"{policy} {short(means[policy])}" for policy in ranked))
+    return f"\nThe others, on the first {seeds} of these seeds: {'; '.join(texts)}.\n" if texts else ""
+
+
+def _by_length(groups: Groups, name: str) -> tuple[Mapping[str, Sequence[Row]], Mapping[str, Sequence[Row]]]:
+    """Rows by policy in a set, of the policies with the most episodes and of the others."""
+    mine = {policy: rows for (policy, where), rows in groups.items() if where == name}
+    most = max(map(len, mine.values()), default=0)
+    return (
+        {policy: rows for policy, rows in mine.items() if len(rows) == most},
+        {policy: rows for policy, rows in mine.items() if len(rows) < most},
+    )
 
 
 def _final_cells(mine: Mapping[str, Sequence[Row]], trainings: Sequence[str], headline: str) -> tuple[str, str]:

@@ -87,7 +87,8 @@ def _scores(table: Any) -> str:
 def _worst(table: Any) -> str:
     """The axes, but X, with a policy's lowest scores, the lowest first."""
     scores = {name: score.value for name in AXES if name != "X" and (score := axis_score(table, name))}
-    return ", ".join(f"{name} {scores[name]:.2f}" for name in sorted(scores, key=scores.__getitem__)[:_WORST]) or NOTHING
+    lowest = sorted(scores, key=scores.__getitem__)[:_WORST]
+    return ", ".join(f"{name} {scores[name]:.2f}" for name in lowest) or NOTHING
 
 
 def _text(score: Estimate | None) -> str:
