@@ -1,6 +1,7 @@
 """The page of a task, written from the rows of its episodes alone."""
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
 from string import Template
 
 import numpy as np
@@ -128,10 +129,12 @@ def _others(groups: Groups, study: Study) -> str:
     texts, seeds = list[str](), 0
     for scenario, name in study.final.items():
         _, mine = _by_length(groups, name)
-        means = {policy: float(np.mean(measured(rows, study.headline))) for policy, rows in mine.items()}
-        if ranked := sorted(means, key=means.__getitem__, reverse=True):
-            seeds = len(mine[ranked[0]])
-            texts.append(f"on `{scenario}` " + ", ".join(f"{policy} {short(means[policy])}" for policy in ranked))
+        means = [(policy, float(np.mean(measured(rows, study.headline)))) for policy, rows in mine.items()]
+        if ranked := sorted(means, key=lambda pair: pair[1], reverse=True):
+            seeds = len(mine[ranked[0][0]])
+            equal = groupby(ranked, lambda pair: short(pair[1]))
+            cells = (f"{', '.join(policy for policy, _ in pairs)} {value}" for value, pairs in equal)
+            texts.append(f"on `{scenario}` " + ", ".join(cells))
     return f"\nThe others, on the first {seeds} of these seeds: {'; '.join(texts)}.\n" if texts else ""
 
 
