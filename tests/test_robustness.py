@@ -104,7 +104,7 @@ def test_the_command_writes_results_page_and_picture(tmp_path):
     succeeds("robustness", *words.split(), tmp_path)
     text = (tmp_path / "robustness.md").read_text()
     assert "The axes are A1 (actuator lag)." in text
-    assert "worst axes |" in text
+    assert "| – | A1 0." in text, "its worst axis, after the score of X, which was not run"
     assert "C1" not in text, "it uses neither link nor modem"
     assert "still water, no noise, no delay" in text
     rows = job.read_episodes(tmp_path / "episodes.csv")
