@@ -122,6 +122,7 @@ def test_other_tasks_are_scored_by_their_main_metric_within_their_own_time(tmp_p
     rows = job.read_episodes(job.run(tmp_path, plan, silent)).set_index(["scenario", "axis"])
     assert [*rows.loc["silent_targets_easy"].index] == [CALM, "F4"], "its obstacles can't be made to move"
     assert [*rows.loc["starter"].index] == [CALM, "W4", "F4"]
+    assert "Levels 3; without W4." in page.report(rows.reset_index())
     success = scores.by_seed(rows.reset_index())
     for scenario, name in (("silent_targets_easy", "held_share"), ("starter", "success_share")):
         assert success.loc[(scenario, "idle", 0), (CALM, 0)] == rows.loc[(scenario, CALM), name]

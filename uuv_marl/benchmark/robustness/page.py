@@ -17,7 +17,7 @@ from uuv_marl.scenario import IDEAL, conditions, load_scenario, scenario_names
 
 _GROUPS = [*(group for group in GROUPS if group != "X"), EVERY, "X"]
 _WORST = 3
-"""Axes that a policy's row names."""
+"""Number of axes that a policy's row names."""
 
 
 def write_robustness_report(folder: Path) -> list[Path]:
@@ -66,8 +66,10 @@ def _main(table: Any) -> Any:
 def _scenario(name: str, table: Any) -> str:
     """A scenario's table and picture."""
     picture = f"![Success over severity on {name}]({_picture(name)})"
-    levels = ", ".join(map(str, sorted({level for _, level in table.columns[table.notna().any()]} - {0})))
-    return f"## {name}\n\nLevels {levels}.\n\n{_scores(table)}\n{picture}\n"
+    cells = table.columns[table.notna().any()]
+    levels = ", ".join(map(str, sorted({level for _, level in cells} - {0})))
+    missing = ", ".join(axis for axis in AXES if axis in table and axis not in {run for run, _ in cells})
+    return f"## {name}\n\nLevels {levels}{missing and f'; without {missing}'}.\n\n{_scores(table)}\n{picture}\n"
 
 
 def _scores(table: Any) -> str:
