@@ -22,6 +22,7 @@ from uuv_marl.tasks.maps.walls import Range, Span, between
 from uuv_marl.tasks.reach import Reach
 from uuv_marl.tasks.reward import Terms
 from uuv_marl.tasks.search import FORGET_S, cover, fans, num_cells
+from uuv_marl.tasks.unsearched import NUM_OCTANTS, RINGS_M, UNSEARCHED, num_plots, update_map
 from uuv_marl.types import Bool, Float64, Int64
 
 _SEARCH_SHARE = 0.3
@@ -80,6 +81,9 @@ class SilentTargetsMemory(NamedTuple):
     judged: Annotated[Float64, "world", "Decisions of the last half."]
     covered_s: Annotated[Float64, "world cell", "When an array last covered the cell, for the reward ``search`` [s]."]
     newly_covered: Annotated[Float64, "world vehicle", "Number of cells that the vehicle covered in the latest step."]
+    searched_s: Annotated[
+        Float64, "world vehicle plot", "When the vehicle last noted a search there, ``unsearched`` [s]."
+    ]
 
 
 @compiled
@@ -133,7 +137,7 @@ class SilentTargets(Reach):
     observed: ClassVar[FieldTable] = (
         PerceptField("box", (2,), DIRECTION, "cosine and sine of the compass heading from the box's first axis"),
     )
-    channels: ClassVar[Mapping[str, FieldTable]] = {"path": PATH_FIELDS}
+    channels: ClassVar[Mapping[str, FieldTable]] = {"path": PATH_FIELDS, "unsearched": UNSEARCHED}
     rewards: ClassVar[Mapping[str, Mapping[str, str]]] = {"dense": _DENSE, "search": {
         **_DENSE,
         "search": f"+{_SEARCH_SHARE:g} · w_arrival · n for the share of the box that the vehicle's arrays cover; "
@@ -166,8 +170,9 @@ class SilentTargets(Reach):
         """An obstacle per target, and all turns of an episode."""
         numbers, limit = scenario.task_numbers, scenario.time_limit.of(cls.longest_s(scenario))
         turns = math.ceil(limit / numbers.turn_s[0])
+        plots = num_plots(numbers.side_m) if "unsearched" in scenario.sonar.channels else 0
         return {"point": 2, "obstacle": numbers.targets, "target": numbers.targets, "turn": turns,
-                "cell": num_cells(numbers.side_m)}  # fmt: skip
+                "cell": num_cells(numbers.side_m), "plot": plots}  # fmt: skip
 
     @classmethod
     def longest_s(cls, scenario: Scenario) -> float:
@@ -189,6 +194,7 @@ class SilentTargets(Reach):
         memory.turn_by[world] = rng.uniform(-math.pi, math.pi, (m, turns))
         memory.found_s[world] = math.inf
         memory.covered_s[world] = -FORGET_S
+        memory.searched_s[world] = -math.inf
         middle = np.array([[-1.0, 0.0], [0.0, 0.0]])
         return EpisodeSetup(
             (middle,), (np.zeros(2),), discs, eta, nu, group=np.zeros(n, np.int64), informed=np.ones(n, np.bool_),
@@ -251,12 +257,15 @@ class SilentTargets(Reach):
             half, state = 0.5 * self.numbers.side_m, self.swarm.state
             cover(running, time_s, half, self._fans, state.eta, state.alive, memory.covered_s, memory.newly_covered)
 
-    def observe(self, running: Bool) -> Terms:  # noqa: ARG002
-        """The heading in the box, and with the channel ``path`` the path to the vehicle's own target.
+    def observe(self, running: Bool) -> Terms:
+        """The heading in the box, and the fields of the channels.
 
-        Targets are assigned so that the sum of all paths is smallest; a path leads to the target's position soon.
+        For ``path`` targets are assigned so that the sum of all paths is smallest; a path leads to the target's
+        position soon.
         """
         swarm, fields = self.swarm, {"box": self.swarm.compass}
+        if "unsearched" in swarm.scenario.sonar.channels:
+            fields["unsearched"] = self._unsearched(running)
         if "path" not in swarm.scenario.sonar.channels:
             return fields
         world_map, away = swarm.world_map, self.away()
@@ -266,6 +275,16 @@ class SilentTargets(Reach):
             vehicle, target = linear_sum_assignment(np.minimum(away[w], 1e9))
             path[w, vehicle] = soon[w, target] - swarm.state.eta[w, vehicle, :2]
         return {**fields, **path_terms(swarm, path, np.sqrt((path * path).sum(axis=2)))}
+
+    def _unsearched(self, running: Bool) -> Float64:
+        """The field of the channel ``unsearched``, after the latest percept is in each vehicle's map."""
+        see, compass = self.swarm.percept, self.swarm.compass
+        shares = np.zeros((*compass.shape[:2], len(RINGS_M), NUM_OCTANTS))
+        update_map(
+            running, self.swarm.facts.time_s, 0.5 * self.numbers.side_m, self._fans, see["reference"], compass,
+            see["detected"], see["neighbour"], self.memory.searched_s, shares,
+        )  # fmt: skip
+        return shares
 
     @classmethod
     def state_fields(cls, scenario: Scenario) -> FieldTable:
