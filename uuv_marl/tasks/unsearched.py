@@ -16,9 +16,7 @@ FORGET_S = 200.0
 NEIGHBOUR_M = 75.0
 """Distance from a detected neighbour within which plots count as searched [m]. Assumed: most of its bow's range."""
 NUM_OCTANTS = 8
-_MEANING = (
-    f"unsearched share of octants, clockwise from the bow, up to {RINGS_M[0]:g} m and from there to {RINGS_M[1]:g} m"
-)
+_MEANING = f"unsearched share of octants, clockwise from the bow, up to {RINGS_M[0]:g} m and on to {RINGS_M[1]:g} m"
 UNSEARCHED = (PerceptField("unsearched", (len(RINGS_M), NUM_OCTANTS), FLAG, _MEANING),)
 """Fields of the channel."""
 
