@@ -53,7 +53,9 @@ def mark(
 
 
 @compiled
-def look(time_s: float, x: float, y: float, heading: tuple[float, float], searched_s: Float64, shares: Float64) -> None:
+def fill_shares(
+    time_s: float, x: float, y: float, heading: tuple[float, float], searched_s: Float64, shares: Float64
+) -> None:
     """Fill the unsearched shares of octants around (x, y) [m], shape (ring, octant); nothing is outside the box."""
     side, near, far = round(math.sqrt(searched_s.shape[0])), RINGS_M[0], RINGS_M[1]
     shares[:] = 0.0
@@ -101,4 +103,4 @@ def update_map(
                     ahead, right = float(neighbour[w, i, k, 0]), float(neighbour[w, i, k, 1])
                     n_x, n_y = x + c * ahead - s * right, y + s * ahead + c * right
                     mark(time_s[w], n_x, n_y, NEIGHBOUR_M, (1.0, 0.0), -1.0, own)
-            look(time_s[w], x, y, (c, s), own, shares[w, i])
+            fill_shares(time_s[w], x, y, (c, s), own, shares[w, i])
