@@ -46,9 +46,10 @@ def report(rows: Sequence[Row]) -> str:
 
 
 def _sets(groups: Groups, policies: Sequence[str]) -> str:
-    """Collision-free arrivals: a row for each policy, a column for each set."""
+    """Collision-free arrivals: a row for each policy that ran on several sets, a column for each set."""
     names = [held.name for held in SETS if any(held.name == name for _, name in groups)]
-    rows = [(policy, *(_share(groups.get((policy, name), ())) for name in names)) for policy in policies]
+    cells = [(policy, *(_share(groups.get((policy, name), ())) for name in names)) for policy in policies]
+    rows = [row for row in cells if len(names) - row.count(NOTHING) > 1 or len(names) == 1]
     return markdown_table(("policy", *(name.removeprefix("random_field_") for name in names)), rows)
 
 
