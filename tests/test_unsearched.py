@@ -93,6 +93,17 @@ def test_plots_near_a_detected_neighbour_count_as_searched():
     assert not has_mark[near[2]].any()
 
 
+def test_a_map_is_the_same_in_any_batch():
+    changes = {"sonar.channels": ["unsearched"]}
+    single, among = started("silent_targets", changes, 1, 10_101), started("silent_targets", changes, 3, 10_100)
+    for k in range(40):
+        force = np.array([1.0, 0.3 * math.sin(k)])
+        single.step(np.tile(force, (1, 8, 1)))
+        among.step(np.tile(force, (3, 8, 1)))
+    np.testing.assert_array_equal(single.percept["unsearched"][0], among.percept["unsearched"][1])
+    assert 0.1 < single.percept["unsearched"].mean() < 0.9
+
+
 def test_without_the_channel_there_is_no_map():
     assert started("silent_targets").task.memory.searched_s.size == 0
 
