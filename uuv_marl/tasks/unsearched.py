@@ -27,6 +27,19 @@ def num_plots(side_m: float) -> int:
 
 
 @compiled
+def place_in_box(reference: Float32, box: Float32 | Float64) -> tuple[float, float]:
+    """Position of a vehicle from the centre of its box [m].
+
+    Args:
+        reference: vector to the centre in the body frame [m], shape (2,).
+        box: cosine and sine of the heading in the box, shape (2,).
+    """
+    c, s = float(box[0]), float(box[1])
+    x, y = float(reference[0]), float(reference[1])
+    return s * y - c * x, -s * x - c * y
+
+
+@compiled
 def octant_of(ahead: float, right: float) -> int:
     """Index of an octant, clockwise from the bow."""
     quadrant = (0 if ahead >= 0.0 else 1) if right >= 0.0 else (2 if ahead < 0.0 else 3)
@@ -93,8 +106,8 @@ def update_map(
     for w in range(box.shape[0]):
         for i in range(box.shape[1] if worlds[w] else 0):
             own, c, s = searched_s[w, i], box[w, i, 0], box[w, i, 1]
-            to_x, to_y = float(reference[w, i, 0]), float(reference[w, i, 1])
-            x, y = half + s * to_y - c * to_x, half - s * to_x - c * to_y
+            x, y = place_in_box(reference[w, i], box[w, i])
+            x, y = x + half, y + half
             for k in range(fan.shape[0]):
                 f_c, f_s = cos_sin(fan[k, 0])
                 mark(time_s[w], x, y, fan[k, 1], (c * f_c - s * f_s, s * f_c + c * f_s), fan[k, 2], own)

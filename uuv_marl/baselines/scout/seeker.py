@@ -23,6 +23,7 @@ from uuv_marl.scenario import Scenario
 from uuv_marl.sim.compiled import compiled
 from uuv_marl.sim.trigonometry import cos_sin
 from uuv_marl.sim.views import fields
+from uuv_marl.tasks.unsearched import place_in_box
 from uuv_marl.types import Bool, Float32, Float64
 
 
@@ -175,14 +176,6 @@ def update_tracks(
 
 
 @compiled
-def place_in_box(w: int, i: int, see: Fields, box: Float32) -> tuple[float, float]:
-    """Position of a vehicle in the box, from its centre, which is the reference [m]."""
-    c, s = float(box[w, i, 0]), float(box[w, i, 1])
-    x, y = float(see.reference[w, i, 0]), float(see.reference[w, i, 1])
-    return s * y - c * x, -s * x - c * y
-
-
-@compiled
 def _turn_back(w: int, i: int, most: float, lanes: int, see: Fields, box: Float32, track: TrackedTarget) -> None:
     """Begin a search along the bow or the lane; beyond ``most`` from the centre [m], reflect it or change the lane."""
     search = track.search[w, i]
@@ -191,7 +184,7 @@ def _turn_back(w: int, i: int, most: float, lanes: int, see: Fields, box: Float3
         if lanes:
             lane = round(float(see.identity[w, i, 0]) * lanes - 0.5)
             search[0], search[1] = (1.0 if lane % 2 == 0 else -1.0), lane + 0.5
-    place = place_in_box(w, i, see, box)
+    place = place_in_box(see.reference[w, i], box[w, i])
     for k in range(1 if lanes else 2):
         if abs(place[k]) > most and place[k] * search[k] > 0.0:
             search[k] = -search[k]
@@ -225,7 +218,7 @@ def _searching(
         return to_map_axes(x, y, memory.pose[w, i])
     x, y = track.search[w, i, 0], track.search[w, i, 1]
     if lanes:
-        off = (2.0 * y / lanes - 1.0) * half_m - place_in_box(w, i, see, box)[1]
+        off = (2.0 * y / lanes - 1.0) * half_m - place_in_box(see.reference[w, i], box[w, i])[1]
         far = math.hypot(_AHEAD_M, off)
         x, y = x * _AHEAD_M / far, off / far
     c, s = float(box[w, i, 0]), float(box[w, i, 1])
