@@ -13,7 +13,6 @@ from typing import Annotated
 import numpy as np
 import typer
 from matplotlib.ticker import PercentFormatter
-from PIL import Image
 
 from research.episodes import Row, read_rows, short, write_rows
 from research.second import runnable
@@ -73,7 +72,7 @@ def share(row: Row, kind: str, outcome: str) -> float:
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Draw the shares of both kinds of vehicles that succeed and collide, in 256 colours."""
+    """Draw the shares of both kinds of vehicles that succeed and collide."""
     titles = {"succeeded": "vehicles that succeed", "collided": "vehicles that collide"}
     with house_style():
         figure, axes = panels(2, 2, (4.6, 3.6))
@@ -88,8 +87,6 @@ def draw(rows: Sequence[Row], path: Path) -> None:
             for axis in (ax.xaxis, ax.yaxis):
                 axis.set_major_formatter(PercentFormatter(1.0))
         save(legend(figure, columns=3), path)
-    with Image.open(path) as picture:
-        picture.convert("RGB").quantize(256).save(path, optimize=True)
 
 
 def table(rows: Sequence[Row]) -> str:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from research.episodes import Row, grouped, measured, select
 from research.learners.protocol import AGGREGATED, LEARNERS, MEASURES, TASKS
-from uuv_marl.benchmark.style import panels
+from uuv_marl.benchmark.style import panels, save
 
 
 def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
@@ -29,9 +29,7 @@ def draw_curves(curves: Sequence[Row], rows: Sequence[Row], path: Path) -> Path:
             )
             ax.set(title=name, xlabel=words, ylabel="main metric", ylim=(-0.02, 1.02))
     axes[0].legend()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
-    return path
+    return save(figure, path)
 
 
 def _draw(ax: Axes, curves: Sequence[Row], column: str, unit: float, colour: str, label: str) -> None:

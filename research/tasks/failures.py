@@ -12,7 +12,6 @@ import numpy as np
 import typer
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
-from PIL import Image
 
 from research import FOLDER
 from research.episodes import Row, read_rows, select, short, write_rows
@@ -179,7 +178,7 @@ def table(rows: Sequence[Row], task: str) -> str:
 
 
 def draw(rows: Sequence[Row], task: str, path: Path) -> None:
-    """Draw the first example of the commonest ways of the task's first policy, in 256 colours."""
+    """Draw the first example of the commonest ways of the task's first policy."""
     policy = STUDIES[task].failures[0]
     with house_style():
         shown = select(rows, task=task, policy=policy)[:NUM_SHOWN]
@@ -189,8 +188,6 @@ def draw(rows: Sequence[Row], task: str, path: Path) -> None:
             ax.set_title(f"{row['way']}\n{policy}, seed {row['seed']}")
             ax.set(xlabel="east [m]", ylabel="north [m]")
         save(legend(figure, columns=2 * len(shown)), path)
-    with Image.open(path) as picture:
-        picture.convert("RGB").quantize(256).save(path, optimize=True)
 
 
 def _example(ax: Axes, episode: Episode, index: int) -> None:

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from uuv_marl.atomic import replacing
@@ -19,6 +20,7 @@ with pictures():
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle
+    from PIL import Image
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
 """Okabe and Ito's palette, as in ``house.mplstyle``."""
@@ -69,8 +71,11 @@ def draw_map(ax: Axes, waypoints: NDArray[Any], obstacles: Any, team: str | None
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Save a figure as PNG, with the same bytes for the same picture."""
+    """Save a figure as PNG in 256 colours, with the same bytes for the same picture."""
     path.parent.mkdir(parents=True, exist_ok=True)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").quantize(256)
     with replacing(path) as partial:
-        FigureCanvasAgg(figure).print_png(str(partial), metadata={"Software": None})
+        picture.save(partial, "PNG", optimize=True, dpi=(figure.dpi, figure.dpi))
     return path

@@ -6,7 +6,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from uuv_marl.benchmark.style import house_style, panels
+from uuv_marl.benchmark.style import house_style, panels, save
 from uuv_marl.train.folder import Record
 
 _SHOWN = {
@@ -29,4 +29,4 @@ def draw_curve(rows: Sequence[Sequence[str]], path: Path, title: str) -> None:
         axes[0].set_ylim(-0.02, 1.02)
         axes[0].legend()
         figure.suptitle(title, parse_math=False)
-        figure.savefig(path)
+        save(figure, path)
