@@ -160,7 +160,7 @@ def _final_cells(mine: Mapping[str, Sequence[Row]], trainings: Sequence[str], he
     best = max(rivals, key=lambda rival: shares[rival].mean())
     means, others = resampled([own, shares[best][None]], 0)
     gain = estimate(means.mean(axis=1) - others.mean(axis=1))
-    return _pair(means, rows), f"{short(gain.point)} [{short(gain.low)}, {short(gain.high)}] over {named(best)}"
+    return _pair(means, rows), f"{short(gain.point)} [{short(gain.low)}, {short(gain.high)}] over {best}"
 
 
 def _pair(means: Float64, rows: Sequence[Row]) -> str:
