@@ -103,7 +103,7 @@ def _show(verdicts: Sequence[Verdict]) -> None:
                      for d in verdict.differences)  # fmt: skip
             result = "[red]differs[/]\n" + escape("\n".join(lines))
         else:
-            result = f"[green]agrees[/] ({len(row.kind.measured)} numbers)"
+            result = f"[green]agrees[/] ({sum(row.cells[name] != '' for name in row.kind.measured)} numbers)"
         table.add_row(escape(row.where), escape(row.name), result)
     if verdicts:
         console.print(table, highlight=False)
