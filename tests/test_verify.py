@@ -52,7 +52,7 @@ def copied(folder, name, wanted, **changes):
     ("heldout.csv.gz", N10, 4),
     ("heldout.csv.gz", N10 | {"policy": "mappo_2"}, 4),
     ("robustness.csv.gz", {"axis": "A1", "level": "3", "policy": "mappo", "seed": "3"}, 1),
-    ("paper.csv.gz", {"policy": "sdc", "seed": "4"}, 1),
+    ("paper.csv.gz", {"policy": "sdc", "seed": "4"}, 4),
 ], ids=["heldout", "second training", "robustness", "paper"])  # fmt: skip
 def test_shipped_rows_come_out_again(tmp_path, name, wanted, numbers):
     output = verify(0, copied(tmp_path, name, wanted))
